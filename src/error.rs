@@ -1,0 +1,78 @@
+//! The library's one error type.
+
+use std::path::PathBuf;
+
+use crate::world::WorldFault;
+
+/// Result of a fallible library call.
+pub type Result<T> = std::result::Result<T, Error>;
+
+/// All that can go wrong in the library.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// A file or folder could not be read or written.
+    #[error("cannot {action} {}: {source}", path.display())]
+    Io {
+        /// What was tried: "read", "write", "create folder".
+        action: &'static str,
+        /// The file or folder.
+        path: PathBuf,
+        /// The system's reason.
+        source: std::io::Error,
+    },
+    /// A file is not what its format asks for.
+    #[error("{}: {message}", path.display())]
+    Parse {
+        /// The file.
+        path: PathBuf,
+        /// Place, what was found and what is expected.
+        message: String,
+    },
+    /// A world file has faults; all of them are listed.
+    #[error("{}", format_faults(path, faults))]
+    World {
+        /// The file.
+        path: PathBuf,
+        /// Its faults.
+        faults: Vec<WorldFault>,
+    },
+    /// A value from the command line or the library's caller is not allowed.
+    #[error("{what}: found {found}, allowed is {allowed}")]
+    Invalid {
+        /// Which value.
+        what: String,
+        /// What was given.
+        found: String,
+        /// What is allowed.
+        allowed: String,
+    },
+    /// No graphics adapter serves the renderer.
+    #[error(
+        "no graphics adapter for the GPU renderer ({0}); use --renderer cpu, or install a Vulkan driver (on Debian mesa-vulkan-drivers is a software one)"
+    )]
+    NoAdapter(String),
+    /// The graphics device failed while in use.
+    #[error("graphics device failed: {0}")]
+    Gpu(String),
+    /// An image could not be encoded or decoded.
+    #[error("image {}: {source}", path.display())]
+    Image {
+        /// The file.
+        path: PathBuf,
+        /// The codec's reason.
+        source: image::ImageError,
+    },
+    /// The run was stopped from outside (Ctrl-C).
+    #[error("interrupted")]
+    Interrupted,
+}
+
+fn format_faults(path: &std::path::Path, faults: &[WorldFault]) -> String {
+    use std::fmt::Write;
+    let mut text = format!("{}: {} fault{}", path.display(), faults.len(), if faults.len() == 1 { "" } else { "s" });
+    for f in faults {
+        let _ = write!(text, "\n  {}: found {}, allowed is {}", f.place, f.found, f.allowed);
+    }
+    text
+}

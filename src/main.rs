@@ -1,0 +1,5 @@
+//! The `wayhome` command.
+
+mod cli;
+
+fn main() {}

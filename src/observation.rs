@@ -1,0 +1,157 @@
+//! What a homing method may know, and what it answers: the border that keeps the truth out.
+//!
+//! A [`Method`] is built from a [`Briefing`] (the home snapshot, the robot's own data sheet, the task) and then gets one
+//! [`Observation`] a control step. None of these types holds a true pose, a true range or anything else of the simulator, so a
+//! method cannot look at the truth.
+
+use crate::geometry::{Matrix3, Pose, Twist};
+
+/// Names a landmark (a feature or an object) of the home snapshot, or one met later on the way. Stable over a run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct LandmarkId(pub u32);
+
+/// Direction in which a landmark is seen.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Bearing {
+    /// Which landmark.
+    pub id: LandmarkId,
+    /// Azimuth from the robot's heading, rad, in (-pi, pi].
+    pub azimuth_rad: f64,
+    /// Standard deviation of the azimuth as the sensor states it, rad.
+    pub sd_rad: f64,
+}
+
+/// Motion since the last observation, from wheel encoders (and a gyro, where the robot has one). Never from the true pose.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Odometry {
+    /// Mean twist over the interval.
+    pub twist: Twist,
+    /// Length of the interval, s. Zero in the first observation.
+    pub dt_s: f64,
+}
+
+/// What was seen at home, stored before the run: bearings from the home pose. Their frame is the home frame.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct HomeSnapshot {
+    /// Bearings at home, each id once.
+    pub bearings: Vec<Bearing>,
+}
+
+/// One control step's input.
+#[derive(Debug, Clone, Copy)]
+pub struct Observation<'a> {
+    /// Time since the start of the run, s.
+    pub time_s: f64,
+    /// Motion since the last observation.
+    pub odometry: Odometry,
+    /// Bearings seen now, each id at most once. May hold wrong matches.
+    pub bearings: &'a [Bearing],
+}
+
+/// The robot's data sheet, as its maker would state it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RobotSheet {
+    /// Distance between the wheels, m.
+    pub track_m: f64,
+    /// Greatest forward speed, m/s.
+    pub max_speed_m_s: f64,
+    /// Greatest yaw rate, rad/s.
+    pub max_turn_rate_rad_s: f64,
+    /// Greatest acceleration that the drive commands, m/s^2.
+    pub max_acceleration_m_s2: f64,
+}
+
+/// The task: how fast to drive and when it counts as done.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TaskSheet {
+    /// Cruising speed, m/s.
+    pub speed_m_s: f64,
+    /// Time between observations, s.
+    pub control_period_s: f64,
+    /// Radius around home within which the robot has arrived (the paper's Rc), m.
+    pub arrival_radius_m: f64,
+}
+
+/// All that a method is told before the run.
+#[derive(Debug, Clone)]
+pub struct Briefing {
+    /// The stored snapshot.
+    pub home: HomeSnapshot,
+    /// The robot.
+    pub robot: RobotSheet,
+    /// The task.
+    pub task: TaskSheet,
+}
+
+/// Where the robot believes that it is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Estimate {
+    /// Pose of the robot in the home frame: R and theta of the paper are the polar form of its position, alpha its heading.
+    pub pose: Pose,
+    /// Covariance of (x, y, heading), m^2, m rad, rad^2.
+    pub covariance: Matrix3<f64>,
+}
+
+impl Estimate {
+    /// Range to home, m (the paper's R).
+    #[must_use]
+    pub fn range_m(&self) -> f64 {
+        self.pose.position().norm()
+    }
+
+    /// Bearing of the robot from home in the home frame, rad (the paper's theta).
+    #[must_use]
+    pub fn bearing_rad(&self) -> f64 {
+        crate::geometry::angle_of(self.pose.position())
+    }
+
+    /// Direction in which home lies from the robot's heading, rad.
+    #[must_use]
+    pub fn home_direction_rad(&self) -> f64 {
+        crate::geometry::wrap(crate::geometry::angle_of(-self.pose.position()) - self.pose.heading)
+    }
+
+    /// Larger standard deviation of the position, along the long axis of its ellipse, m.
+    #[must_use]
+    pub fn position_sd_m(&self) -> f64 {
+        let c = &self.covariance;
+        let mean = 0.5 * (c[(0, 0)] + c[(1, 1)]);
+        let half_difference = 0.5 * (c[(0, 0)] - c[(1, 1)]);
+        let largest = mean + libm::hypot(half_difference, c[(0, 1)]);
+        largest.max(0.0).sqrt()
+    }
+}
+
+/// What a method thinks of its own run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Status {
+    /// On the way.
+    Running,
+    /// Claims to be home and has stopped.
+    Arrived,
+    /// What it sees no longer fits what it believes, and it cannot recover.
+    Lost,
+}
+
+/// One control step's answer.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Decision {
+    /// Commanded twist until the next observation.
+    pub command: Twist,
+    /// Belief about the pose, for methods that have one, once they have one.
+    pub estimate: Option<Estimate>,
+    /// State of the run in the method's own view.
+    pub status: Status,
+    /// Bearings used in this step.
+    pub matched: usize,
+    /// Bearings seen in this step and refused as wrong.
+    pub rejected: usize,
+    /// Normalised innovation squared per used bearing, 1 on average for a consistent filter; NaN where there is none.
+    pub nis: f64,
+}
+
+/// A homing method: observations in, wheel commands out.
+pub trait Method: Send {
+    /// Takes one observation and returns the command to hold until the next.
+    fn step(&mut self, observation: &Observation<'_>) -> Decision;
+}

@@ -1,0 +1,56 @@
+//! The renderer: what a panoramic camera on the robot sees, in colours, range and instance ids.
+//!
+//! Two renderers share one packed [`Scene`]: a wgpu compute raycaster (`shaders/*.wgsl`) and its CPU twin. They agree to
+//! within rounding, which `tests/render_agreement.rs` measures.
+
+use crate::error::Result;
+use crate::geometry::Pose;
+use crate::panorama::{Panorama, Projection};
+
+/// Which renderer a person asks for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum RendererChoice {
+    /// A hardware GPU where there is one, else the CPU.
+    Auto,
+    /// Any graphics adapter, a software one included; an error where there is none.
+    Gpu,
+    /// The CPU twin.
+    Cpu,
+}
+
+/// What rendered, for the record.
+#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
+pub struct RendererInfo {
+    /// "gpu" or "cpu".
+    pub kind: String,
+    /// Name of the adapter, or of the processor's instruction set.
+    pub adapter: String,
+    /// Driver and version; empty for the CPU.
+    pub driver: String,
+}
+
+/// One picture to take.
+#[derive(Debug, Clone, Copy)]
+pub struct View<'a> {
+    /// Size and projection.
+    pub projection: Projection,
+    /// Pose of the robot in the room; the camera stands at the world's camera height above it.
+    pub robot: Pose,
+    /// Current pose of every body, in the order of `World::bodies`.
+    pub bodies: &'a [Pose],
+}
+
+/// A renderer of either kind.
+pub trait Renderer: Send {
+    /// Renders one view into `out`, whose buffers are resized as needed and otherwise reused.
+    ///
+    /// # Errors
+    /// When the graphics device fails, or the size is more than it allows.
+    fn render(&mut self, scene: &Scene, view: &View<'_>, out: &mut Panorama) -> Result<()>;
+
+    /// What this renderer is.
+    fn info(&self) -> &RendererInfo;
+}
+
+/// A world packed for rendering: geometry, materials and textures, the same for both renderers.
+pub struct Scene {}

@@ -1,0 +1,124 @@
+//! Worlds: rooms with landmarks, obstacles, floor, robot, camera and home, loaded from a file and checked as a whole.
+//!
+//! [`WorldSpec`] is the file as written, [`World`] the checked form: absolute corners, radians, instance ids. Loading reports
+//! every fault of a file at once; see [`WorldFault`].
+
+mod load;
+pub mod spec;
+
+use std::path::PathBuf;
+
+use crate::geometry::{Pose, Vector2};
+use crate::panorama::{INSTANCE_FIRST_WALL, Projection};
+pub use spec::{MotionSpec, RobotSpec, TaskSpec, TextureFamily, TextureSpec, WorldSpec};
+
+/// One fault of a world file.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct WorldFault {
+    /// Where in the file, as a path of fields: `landmarks[2].height_m`.
+    pub place: String,
+    /// What stands there.
+    pub found: String,
+    /// What is allowed.
+    pub allowed: String,
+}
+
+/// A checked world.
+#[derive(Debug, Clone, PartialEq)]
+pub struct World {
+    /// The file as written, defaults filled in.
+    pub spec: WorldSpec,
+    /// Where it was loaded from; `builtin:NAME` for a built-in world.
+    pub source: PathBuf,
+    /// SHA-256 of the file's bytes, lower-case hexadecimal.
+    pub sha256: String,
+    /// Corners of the room, anti-clockwise, m. Wall k runs from corner k to corner k + 1.
+    pub outline: Vec<Vector2<f64>>,
+    /// Texture of each wall, with its seed filled in.
+    pub wall_textures: Vec<TextureSpec>,
+    /// Texture of the floor, with its seed filled in.
+    pub floor_texture: TextureSpec,
+    /// Texture of the ceiling, with its seed filled in.
+    pub ceiling_texture: TextureSpec,
+    /// Landmarks first, then obstacles, each in the file's order.
+    pub bodies: Vec<Body>,
+    /// How many of `bodies` are landmarks.
+    pub landmark_count: usize,
+    /// Floor zones.
+    pub zones: Vec<Zone>,
+    /// Home pose.
+    pub home: Pose,
+}
+
+/// Footprint of a body around its own origin.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Footprint {
+    /// A disc of this radius, m.
+    Disc(f64),
+    /// A convex polygon, corners anti-clockwise, m.
+    Polygon(Vec<Vector2<f64>>),
+}
+
+/// A body of a checked world.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Body {
+    /// Name from the file.
+    pub name: String,
+    /// Footprint in the body's own frame.
+    pub footprint: Footprint,
+    /// Pose at time 0.
+    pub pose: Pose,
+    /// Height of the underside, m.
+    pub bottom_m: f64,
+    /// Height of the top, m.
+    pub top_m: f64,
+    /// Texture, with its seed filled in.
+    pub texture: TextureSpec,
+    /// How it moves.
+    pub motion: Option<MotionSpec>,
+    /// Instance id in panoramas.
+    pub instance: u16,
+}
+
+/// A floor zone of a checked world.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Zone {
+    /// Corners, anti-clockwise, m.
+    pub polygon: Vec<Vector2<f64>>,
+    /// Friction inside.
+    pub friction: f64,
+}
+
+impl World {
+    /// The landmark bodies.
+    #[must_use]
+    pub fn landmarks(&self) -> &[Body] {
+        &self.bodies[..self.landmark_count]
+    }
+
+    /// Instance id of wall `k`.
+    #[must_use]
+    pub fn wall_instance(&self, k: usize) -> u16 {
+        INSTANCE_FIRST_WALL + k as u16
+    }
+
+    /// The camera's projection as the file has it.
+    #[must_use]
+    pub fn projection(&self) -> Projection {
+        let c = &self.spec.camera;
+        self.projection_of_size(c.width_px, c.height_px)
+    }
+
+    /// The camera's projection at another size: mounting and share of rows above the horizon stay.
+    #[must_use]
+    pub fn projection_of_size(&self, width: u32, height: u32) -> Projection {
+        let c = &self.spec.camera;
+        Projection { width, height, horizon_row: f64::from(height) * c.horizon, mount_rad: c.mount_deg.to_radians() }
+    }
+
+    /// Poses of all bodies at time 0, in the order of [`World::bodies`].
+    #[must_use]
+    pub fn body_poses(&self) -> Vec<Pose> {
+        self.bodies.iter().map(|b| b.pose).collect()
+    }
+}
