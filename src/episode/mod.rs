@@ -1,1 +1,3 @@
-//! episode
+//! Episodes: plant x sensor x method, closed and logged.
+
+pub mod method;
