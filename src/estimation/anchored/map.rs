@@ -51,6 +51,8 @@ pub struct Update {
     pub used: Vec<Bearing>,
     /// Bearings refused by the gate.
     pub rejected: usize,
+    /// Bearings of landmarks that are ignored because they did not fit before.
+    pub banned: usize,
     /// Bearings of landmarks that the map does not hold and has not banned.
     pub strangers: Vec<Bearing>,
     /// Normalised innovation squared of the used bearings, all together.
@@ -174,6 +176,8 @@ impl Map {
             let Some(&k) = index.get(&bearing.id) else {
                 if self.banned.get(&bearing.id).is_none_or(|&until| until < self.step) {
                     update.strangers.push(*bearing);
+                } else {
+                    update.banned += 1;
                 }
                 continue;
             };

@@ -264,7 +264,9 @@ impl AnchoredFilter {
         }
         self.store(motion, &update);
         let report = StepReport { matched: updated, rejected: update.rejected, nis };
-        let bad = update.rejected >= 4 && update.rejected > update.used.len();
+        // Landmarks just added fit by construction; only those that were predicted testify for the belief.
+        let against = update.rejected + update.banned;
+        let bad = against >= 4 && against > updated;
         self.bad_steps = if bad { self.bad_steps + 1 } else { 0 };
         if self.bad_steps > self.settings.patience_steps {
             self.restart();
@@ -350,12 +352,14 @@ impl AnchoredFilter {
     /// Builds the map of the second stage anew from all that is stored.
     fn rebuild(&mut self) {
         let ids: Vec<_> = self.map.ids().collect();
+        let held = ids.len();
         let start = Iterate {
             poses: self.history.iter().map(|s| s.pose).collect(),
             landmarks: (0..ids.len()).map(|k| self.map.landmark(k).0).collect(),
         };
         if let Some((kept, solution)) = self.smooth(ids, start)
             && kept.len() >= 3
+            && 2 * kept.len() > held
         {
             self.map.replace(&kept, solution.mean.clone(), solution.covariance.clone());
             self.keep_poses(&solution);
@@ -388,7 +392,9 @@ impl AnchoredFilter {
                         .collect(),
                 })
                 .collect();
-            let solution = Stretch { frames: &frames, priors: &priors }.solve(start)?;
+            // Wrong matches are told apart first, then what is left is taken at its word.
+            let heavy_tails = round == 1;
+            let solution = Stretch { frames: &frames, priors: &priors, heavy_tails }.solve(start)?;
             let mut seen = vec![(0_usize, 0_usize); ids.len()];
             let mut clean = true;
             for (f, frame) in frames.iter().enumerate() {
@@ -407,7 +413,7 @@ impl AnchoredFilter {
                 misses as f64 <= MISFIT_SHARE * total as f64 && off * off <= gate * priors[k].variance[0]
             };
             let kept: Vec<usize> = (0..ids.len()).filter(|&k| keeps(k)).collect();
-            if (clean || round == SMOOTHER_ROUNDS) && kept.len() == ids.len() {
+            if !heavy_tails && (clean || round == SMOOTHER_ROUNDS) && kept.len() == ids.len() {
                 let (sum, count) = solution.chi_square;
                 return (sum <= GREATEST_MEAN_SQUARE * count as f64).then_some((ids, solution));
             }

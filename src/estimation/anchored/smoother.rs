@@ -67,7 +67,13 @@ pub struct Stretch<'a> {
     pub frames: &'a [Frame],
     /// Priors of the landmarks, from the snapshot.
     pub priors: &'a [Prior],
+    /// Take the bearings' noise for Student's t instead of Gaussian: wrong matches then pull little, but the covariance is
+    /// that of the weights and not to be used.
+    pub heavy_tails: bool,
 }
+
+/// Degrees of freedom of the heavy tails.
+const TAIL: f64 = 3.0;
 
 const ITERATIONS: usize = 12;
 
@@ -122,6 +128,15 @@ impl Stretch<'_> {
         r * r / s.variance
     }
 
+    /// Contribution of a squared normalised residual to the cost, and its weight in the normal equations.
+    fn loss(&self, squared: f64) -> (f64, f64) {
+        if self.heavy_tails {
+            ((TAIL + 1.0) * libm::log(1.0 + squared / TAIL), (TAIL + 1.0) / (TAIL + squared))
+        } else {
+            (squared, 1.0)
+        }
+    }
+
     fn bearing_chi_square(&self, at: &Iterate) -> (f64, usize) {
         let mut sum = 0.0;
         let mut count = 0;
@@ -135,7 +150,10 @@ impl Stretch<'_> {
     }
 
     fn cost(&self, at: &Iterate) -> f64 {
-        let mut sum = self.bearing_chi_square(at).0;
+        let mut sum = 0.0;
+        for (k, frame) in self.frames.iter().enumerate() {
+            sum += frame.sightings.iter().map(|s| self.loss(Self::residual_squared(at, k, s)).0).sum::<f64>();
+        }
         for (prior, l) in self.priors.iter().zip(&at.landmarks) {
             let d = wrap(l[0] - prior.mean[0]);
             let r = l[1] - prior.mean[1];
@@ -171,7 +189,7 @@ impl Stretch<'_> {
                 let l = at.landmarks[s.landmark];
                 let (predicted, d) = predict_bearing(&at.poses[k], l[0], l[1]);
                 let r = wrap(s.azimuth_rad - predicted);
-                let w = 1.0 / s.variance;
+                let w = self.loss(r * r / s.variance).1 / s.variance;
                 let jp = Vector3::new(d[0], d[1], d[2]);
                 pp += w * jp * jp.transpose();
                 p_right += w * r * jp;
