@@ -65,12 +65,8 @@ impl World {
                 instance: first_body + k as u16,
             })
             .collect();
-        let zones = spec
-            .floor
-            .zones
-            .iter()
-            .map(|z| Zone { polygon: anticlockwise(&z.polygon_m), friction: z.friction })
-            .collect();
+        let zones =
+            spec.floor.zones.iter().map(|z| Zone { polygon: anticlockwise(&z.polygon_m), friction: z.friction }).collect();
         let home = Pose::new(spec.home.x_m, spec.home.y_m, spec.home.heading_deg.to_radians());
         Self {
             wall_textures,
