@@ -1,0 +1,212 @@
+//! Features: blobs that stand out in position and scale, found to a fraction of a pixel.
+//!
+//! A feature is an extremum of the difference-of-Gaussians over its eight neighbours and over the layers below and above
+//! (Lowe 2004, on the half-octave pyramid). The robot turns about the vertical only, so features have no orientation: up is
+//! up in every picture.
+
+use super::ExtractorSettings;
+use super::pyramid::{BASE_SIGMA, Image, Pyramid};
+
+/// A feature of a panorama.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Feature {
+    /// Column, panorama pixels, in [0, width).
+    pub x: f32,
+    /// Row, panorama pixels.
+    pub y: f32,
+    /// Scale: standard deviation of the Gaussian that fits the blob, panorama pixels.
+    pub sigma: f32,
+    /// Octave and image within it that suit the scale.
+    pub octave: usize,
+    pub level: usize,
+    /// Strength of the difference-of-Gaussians, grey levels; negative for a bright blob.
+    pub response: f32,
+}
+
+/// Finds the features of a pyramid and keeps the strongest, spread over azimuth and scale, in an order that depends on the
+/// picture only.
+pub(super) fn detect(
+    pyramid: &Pyramid,
+    settings: &ExtractorSettings,
+    limit: usize,
+    scratch: &mut Scratch,
+    features: &mut Vec<Feature>,
+) {
+    features.clear();
+    let layers = 2 * pyramid.octaves.len();
+    for layer in 0..layers - 1 {
+        scan(pyramid, layer, settings, scratch, features);
+    }
+    let width = pyramid.octaves[0].gauss[0].width as f32;
+    spread(features, width, settings.spread_rad as f32 / std::f32::consts::TAU * width, limit);
+}
+
+/// A layer's difference image and its size relative to the panorama.
+fn layer_of(pyramid: &Pyramid, layer: usize) -> (&Image, f32, f32) {
+    let octave = &pyramid.octaves[layer / 2];
+    (&octave.difference[layer % 2], octave.step_x, octave.step_y)
+}
+
+fn scan(pyramid: &Pyramid, layer: usize, settings: &ExtractorSettings, scratch: &mut Scratch, features: &mut Vec<Feature>) {
+    let (image, step_x, step_y) = layer_of(pyramid, layer);
+    let (width, height) = (image.width, image.height);
+    for y in 1..height - 1 {
+        let rows = [image.row(y - 1), image.row(y), image.row(y + 1)];
+        scratch.find(rows, settings.contrast);
+        for &x in &scratch.found {
+            let (left, right) = (if x == 0 { width - 1 } else { x - 1 }, if x + 1 == width { 0 } else { x + 1 });
+            let patch = rows.map(|row| [row[left], row[x], row[right]]);
+            let value = patch[1][1];
+            let sign = value.signum();
+            let (xf, yf) = (x as f32, y as f32);
+            let other = |layer: usize, x: f32, y: f32| {
+                let (image, sx, sy) = layer_of(pyramid, layer);
+                sign * image.sample(x * step_x / sx, y * step_y / sy)
+            };
+            let tops = |layer: usize| {
+                [(0.0, 0.0), (-1.0, 0.0), (1.0, 0.0), (0.0, -1.0), (0.0, 1.0)]
+                    .iter()
+                    .all(|&(dx, dy)| other(layer, xf + dx, yf + dy) < sign * value)
+            };
+            // The finest layer has none below it: what is smallest there may be smaller still, and is taken as it is.
+            if !tops(layer + 1) || (layer > 0 && !tops(layer - 1)) {
+                continue;
+            }
+            let Some((dx, dy, peak)) = refine(&patch, settings.edge_ratio) else { continue };
+            let (xr, yr) = (xf + dx, yf + dy);
+            let shift = if layer == 0 {
+                0.0
+            } else {
+                let (low, high) = (other(layer - 1, xr, yr), other(layer + 1, xr, yr));
+                let bend = low + high - 2.0 * sign * peak;
+                if bend < 0.0 { (0.5 * (low - high) / bend).clamp(-0.5, 0.5) } else { 0.0 }
+            };
+            // Mean of the two images' standard deviations: a layer's two Gaussians are sqrt 2 apart.
+            let sigma = BASE_SIGMA * 1.189_207_1 * libm::exp2f(0.5 * (layer as f32 + shift));
+            features.push(Feature {
+                x: xr.rem_euclid(width as f32) * step_x,
+                y: yr * step_y,
+                sigma,
+                octave: layer / 2,
+                level: layer % 2,
+                response: peak,
+            });
+        }
+    }
+}
+
+/// Buffers of the scan.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Scratch {
+    high: Vec<f32>,
+    low: Vec<f32>,
+    mask: Vec<u8>,
+    found: Vec<usize>,
+}
+
+impl Scratch {
+    /// Fills `found` with the columns whose value in the middle row is above `threshold` and above all eight neighbours, or
+    /// below both the negative threshold and all neighbours. Written as plain loops over whole rows, which vectorise; few
+    /// pixels are left for the costlier tests.
+    fn find(&mut self, rows: [&[f32]; 3], threshold: f32) {
+        let [above, row, below] = rows;
+        let width = row.len();
+        self.high.resize(width + 2, 0.0);
+        self.low.resize(width + 2, 0.0);
+        self.mask.resize(width.next_multiple_of(8), 0);
+        // Extremes of each column's three pixels, with a copy of the other end on either side.
+        let columns = above.iter().zip(row).zip(below);
+        for ((high, low), ((a, b), c)) in self.high[1..=width].iter_mut().zip(&mut self.low[1..=width]).zip(columns) {
+            *high = larger(larger(*a, *b), *c);
+            *low = smaller(smaller(*a, *b), *c);
+        }
+        (self.high[0], self.high[width + 1]) = (self.high[width], self.high[1]);
+        (self.low[0], self.low[width + 1]) = (self.low[width], self.low[1]);
+        let high = self.high[..width].iter().zip(&self.high[2..]);
+        let low = self.low[..width].iter().zip(&self.low[2..]);
+        let columns = above.iter().zip(row).zip(below);
+        for (((mask, (h0, h1)), (l0, l1)), ((a, b), c)) in self.mask.iter_mut().zip(high).zip(low).zip(columns) {
+            let top = larger(larger(larger(*h0, *h1), larger(*a, *c)), threshold);
+            let bottom = smaller(smaller(smaller(*l0, *l1), smaller(*a, *c)), -threshold);
+            *mask = u8::from(*b > top) | u8::from(*b < bottom);
+        }
+        self.found.clear();
+        for (k, eight) in self.mask.as_chunks::<8>().0.iter().enumerate() {
+            if u64::from_ne_bytes(*eight) != 0 {
+                self.found.extend((0..8).filter(|&i| eight[i] != 0).map(|i| 8 * k + i));
+            }
+        }
+    }
+}
+
+/// The larger of two numbers; unlike `f32::max` one instruction, since NaN does not occur here.
+fn larger(a: f32, b: f32) -> f32 {
+    if a > b { a } else { b }
+}
+
+/// The smaller of two numbers.
+fn smaller(a: f32, b: f32) -> f32 {
+    if a < b { a } else { b }
+}
+
+/// Fits a quadric to a 3 x 3 patch. Returns the offset of its extremum and the value there, or `None` for an edge (the
+/// ratio of its curvatures is above `edge_ratio`) and where the extremum lies outside of the pixel by far.
+fn refine(p: &[[f32; 3]; 3], edge_ratio: f32) -> Option<(f32, f32, f32)> {
+    let gx = 0.5 * (p[1][2] - p[1][0]);
+    let gy = 0.5 * (p[2][1] - p[0][1]);
+    let xx = p[1][2] + p[1][0] - 2.0 * p[1][1];
+    let yy = p[2][1] + p[0][1] - 2.0 * p[1][1];
+    let xy = 0.25 * (p[2][2] - p[2][0] - p[0][2] + p[0][0]);
+    let det = xx * yy - xy * xy;
+    let trace = xx + yy;
+    if det <= 0.0 || trace * trace * edge_ratio >= (edge_ratio + 1.0) * (edge_ratio + 1.0) * det {
+        return None;
+    }
+    let dx = -(yy * gx - xy * gy) / det;
+    let dy = -(xx * gy - xy * gx) / det;
+    if dx.abs() > 1.0 || dy.abs() > 1.0 {
+        return None;
+    }
+    let (dx, dy) = (dx.clamp(-0.6, 0.6), dy.clamp(-0.6, 0.6));
+    Some((dx, dy, p[1][1] + 0.5 * (gx * dx + gy * dy)))
+}
+
+/// Keeps `limit` features. Each is ranked by how many stronger ones of its octave lie within `reach` columns, and the best
+/// ranked stay: rich corners of the room do not crowd out the poor ones, and no sector border makes a turn of the robot
+/// change the choice.
+fn spread(features: &mut Vec<Feature>, width: f32, reach: f32, limit: usize) {
+    let by_strength = |a: &Feature, b: &Feature| b.response.abs().total_cmp(&a.response.abs());
+    let by_place = |a: &Feature, b: &Feature| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)).then(a.sigma.total_cmp(&b.sigma));
+    if features.len() > limit {
+        // The stable sort keeps the order of equals, which is that of the picture.
+        features.sort_by(|a, b| a.octave.cmp(&b.octave).then(a.x.total_cmp(&b.x)));
+        let mut ranked = Vec::with_capacity(features.len());
+        let (mut places, mut strengths) = (Vec::new(), Vec::new());
+        for class in features.chunk_by(|a, b| a.octave == b.octave) {
+            // Three turns in a row, so that windows across the seam are slices too.
+            places.clear();
+            strengths.clear();
+            for turn in [-width, 0.0, width] {
+                places.extend(class.iter().map(|f| f.x + turn));
+                strengths.extend(class.iter().map(|f| f.response.abs()));
+            }
+            let (mut from, mut to) = (0, 0);
+            for feature in class {
+                while places[from] < feature.x - reach {
+                    from += 1;
+                }
+                while to < places.len() && places[to] <= feature.x + reach {
+                    to += 1;
+                }
+                let strength = feature.response.abs();
+                let rank: u32 = strengths[from..to].iter().map(|s| u32::from(*s > strength)).sum();
+                ranked.push((rank, *feature));
+            }
+        }
+        ranked.sort_by(|a, b| a.0.cmp(&b.0).then_with(|| by_strength(&a.1, &b.1)).then_with(|| by_place(&a.1, &b.1)));
+        ranked.truncate(limit);
+        features.clear();
+        features.extend(ranked.into_iter().map(|(_, feature)| feature));
+    }
+    features.sort_by(by_place);
+}
