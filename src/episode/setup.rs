@@ -161,9 +161,7 @@ impl<'a> Bench<'a> {
     /// When a second renderer cannot be had.
     pub fn another(&self) -> Result<Self> {
         let camera = match &self.camera {
-            Some(camera) => {
-                Some(Camera { scene: Arc::clone(&camera.scene), renderer: render::create(self.setup.renderer)? })
-            }
+            Some(camera) => Some(Camera { scene: Arc::clone(&camera.scene), renderer: render::create(self.setup.renderer)? }),
             None => None,
         };
         Ok(Self { camera, ..*self })
@@ -216,9 +214,5 @@ fn robot_sheet(world: &World) -> RobotSheet {
 
 /// What a method is told about the task.
 fn task_sheet(task: &TaskSpec) -> TaskSheet {
-    TaskSheet {
-        speed_m_s: task.speed_m_s,
-        control_period_s: task.control_period_s,
-        arrival_radius_m: task.arrival_radius_m,
-    }
+    TaskSheet { speed_m_s: task.speed_m_s, control_period_s: task.control_period_s, arrival_radius_m: task.arrival_radius_m }
 }

@@ -3,8 +3,8 @@
 use nalgebra::{Cholesky, Vector3};
 use serde::Serialize;
 
-use super::record::{Outcome, Record, Step, Timing};
 use super::method::{LawKind, MethodKind};
+use super::record::{Outcome, Record, Step, Timing};
 use super::setup::{Bearings, PlantKind, Setup};
 use crate::geometry::{Pose, angle_of, wrap};
 use crate::observation::Estimate;

@@ -67,11 +67,7 @@ impl<'a> NoisySensor<'a> {
 
 /// The bearing moved by `deviations` standard deviations; it states the larger of both standard deviations.
 fn blurred(bearing: Bearing, sd_rad: f64, deviations: f64) -> Bearing {
-    Bearing {
-        azimuth_rad: wrap(bearing.azimuth_rad + sd_rad * deviations),
-        sd_rad: bearing.sd_rad.max(sd_rad),
-        ..bearing
-    }
+    Bearing { azimuth_rad: wrap(bearing.azimuth_rad + sd_rad * deviations), sd_rad: bearing.sd_rad.max(sd_rad), ..bearing }
 }
 
 impl Sensor for NoisySensor<'_> {
