@@ -1,0 +1,278 @@
+//! The robot's own dynamics in f64: a rigid body on two driven wheels and a caster, and the floor's friction under them.
+//!
+//! A substep first kicks, then drifts. [`Chassis::kick`] finds the friction impulses at the three contacts such that the
+//! velocities at the *end* of the substep obey the friction law (see `contact`), by projected Gauss-Seidel over the
+//! contacts, started from the last substep's impulses. Implicit friction has no stiffness limit: creep of a millimetre a
+//! second is as stable as a skid. [`Chassis::drift`] moves with the mean of the velocities before and after, which is exact
+//! for constant deceleration.
+//!
+//! Loads follow from the centre of gravity, statically: the caster carries cog/caster of the weight, the wheels the rest in
+//! equal parts. Load transfer is left out; at the accelerations that an indoor robot's motors command it is a few per cent.
+
+use super::contact::{InverseMass, friction_impulse};
+use super::motor::{WheelDrive, WheelSpec, WheelState, flushed};
+use crate::geometry::{Pose, Vector2, sin_cos};
+use crate::world::RobotSpec;
+
+/// Gravity that presses the wheels on the floor, m/s^2.
+pub const STANDARD_GRAVITY_M_S2: f64 = 9.81;
+
+/// Gauss-Seidel sweeps at most. Ordinary driving takes three to five.
+const MAX_SWEEPS: usize = 30;
+/// A sweep that changes no impulse by more than this share of its friction limit is the last.
+const CONVERGED: f64 = 1e-10;
+
+/// Velocity of the centre of gravity in the room's frame, m/s, and yaw rate, rad/s.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct PlanarVelocity {
+    /// Velocity of the centre of gravity, m/s.
+    pub linear: Vector2<f64>,
+    /// Yaw rate, rad/s.
+    pub yaw_rate: f64,
+}
+
+/// A contact with the floor: the left wheel, the right wheel, the caster.
+#[derive(Debug, Clone, PartialEq)]
+struct Foot {
+    /// Place from the centre of gravity in the body's frame, m.
+    place: Vector2<f64>,
+    /// Load, N.
+    load: f64,
+    /// Friction as a share of the floor's.
+    friction_share: f64,
+    /// Friction impulse of the last substep in the body's frame, N s: where the next search starts.
+    impulse: Vector2<f64>,
+}
+
+/// The robot: rigid body, wheels, motors and their contacts with the floor.
+#[derive(Debug, Clone)]
+pub struct Chassis {
+    mass: f64,
+    yaw_inertia: f64,
+    cog_ahead: f64,
+    creep: f64,
+    feet: [Foot; 3],
+    wheels: [WheelSpec; 2],
+    wheel_states: [WheelState; 2],
+    /// Slip at the wheels' contacts after the last kick, body frame, m/s.
+    slip: [Vector2<f64>; 2],
+    /// Position of the centre of gravity, m.
+    position: Vector2<f64>,
+    /// Heading, rad, not wrapped.
+    heading: f64,
+    velocity: PlanarVelocity,
+    /// Velocity before the last kick.
+    velocity_before: PlanarVelocity,
+}
+
+impl Chassis {
+    /// A robot at rest with the middle of its axle at `start`.
+    #[must_use]
+    pub fn new(robot: &RobotSpec, start: Pose) -> Self {
+        let cog = robot.centre_of_gravity_m;
+        let weight = robot.mass_kg * STANDARD_GRAVITY_M_S2;
+        let caster_share = if robot.caster_m == 0.0 { 0.0 } else { (cog / robot.caster_m).clamp(0.0, 1.0) };
+        let foot = |x: f64, y: f64, share: f64, friction_share: f64| Foot {
+            place: Vector2::new(x - cog, y),
+            load: weight * share,
+            friction_share,
+            impulse: Vector2::zeros(),
+        };
+        let wheel_share = 0.5 * (1.0 - caster_share);
+        let half_track = 0.5 * robot.track_m;
+        Self {
+            mass: robot.mass_kg,
+            yaw_inertia: robot.yaw_inertia_kg_m2.unwrap_or(0.5 * robot.mass_kg * robot.radius_m * robot.radius_m),
+            cog_ahead: cog,
+            creep: robot.creep_m_s,
+            feet: [
+                foot(0.0, half_track, wheel_share, 1.0),
+                foot(0.0, -half_track, wheel_share, 1.0),
+                foot(robot.caster_m, 0.0, caster_share, robot.caster_friction),
+            ],
+            wheels: robot.wheel_radius_error.map(|error| WheelSpec::new(robot, robot.wheel_radius_m * (1.0 + error))),
+            wheel_states: Default::default(),
+            slip: [Vector2::zeros(); 2],
+            position: start.transform(Vector2::new(cog, 0.0)),
+            heading: start.heading,
+            velocity: PlanarVelocity::default(),
+            velocity_before: PlanarVelocity::default(),
+        }
+    }
+
+    /// Pose of the middle of the axle.
+    #[must_use]
+    pub fn pose(&self) -> Pose {
+        let (s, c) = sin_cos(self.heading);
+        Pose::new(self.position.x - c * self.cog_ahead, self.position.y - s * self.cog_ahead, self.heading)
+    }
+
+    /// Velocity of the centre of gravity, and yaw rate.
+    #[must_use]
+    pub fn velocity(&self) -> PlanarVelocity {
+        self.velocity
+    }
+
+    /// Sets the robot in motion, as a push would; wheels stay as they are.
+    pub fn set_velocity(&mut self, velocity: PlanarVelocity) {
+        self.velocity = velocity;
+        self.velocity_before = velocity;
+    }
+
+    /// Forward and leftward speed of the middle of the axle, m/s.
+    #[must_use]
+    pub fn axle_velocity(&self) -> Vector2<f64> {
+        let v = into_body(self.velocity.linear, self.heading);
+        Vector2::new(v.x, v.y - self.velocity.yaw_rate * self.cog_ahead)
+    }
+
+    /// Speeds of the left and right wheel, rad/s.
+    #[must_use]
+    pub fn wheel_speeds(&self) -> [f64; 2] {
+        [self.wheel_states[0].speed, self.wheel_states[1].speed]
+    }
+
+    /// Sets the speeds of the left and right wheel, rad/s.
+    pub fn set_wheel_speeds(&mut self, speeds: [f64; 2]) {
+        for (state, speed) in self.wheel_states.iter_mut().zip(speeds) {
+            state.speed = speed;
+        }
+    }
+
+    /// Angles that the left and right wheel have turned since the start, rad.
+    #[must_use]
+    pub fn wheel_angles(&self) -> [f64; 2] {
+        [self.wheel_states[0].angle, self.wheel_states[1].angle]
+    }
+
+    /// True rolling radii of the left and right wheel, m.
+    #[must_use]
+    pub fn wheel_radii(&self) -> [f64; 2] {
+        [self.wheels[0].radius_m, self.wheels[1].radius_m]
+    }
+
+    /// Slip velocity (forward, leftward) of the left and right wheel's contact after the last substep, m/s: the hub's speed
+    /// over ground less the wheel's rolling speed.
+    #[must_use]
+    pub fn slip(&self) -> [Vector2<f64>; 2] {
+        self.slip
+    }
+
+    /// Yaw inertia about the centre of gravity, kg m^2.
+    #[must_use]
+    pub fn yaw_inertia(&self) -> f64 {
+        self.yaw_inertia
+    }
+
+    /// Energy of motion of body and wheels, J.
+    #[must_use]
+    pub fn kinetic_energy(&self) -> f64 {
+        let wheels: f64 = self.wheels.iter().zip(&self.wheel_states).map(|(w, s)| w.energy(s)).sum();
+        let v = &self.velocity;
+        0.5 * self.mass * v.linear.norm_squared() + 0.5 * self.yaw_inertia * v.yaw_rate * v.yaw_rate + wheels
+    }
+
+    /// One substep on an open floor: [`kick`](Self::kick), then [`drift`](Self::drift).
+    pub fn advance(&mut self, drives: [WheelDrive; 2], friction: impl Fn(Vector2<f64>) -> f64, dt: f64) {
+        self.kick(drives, friction, dt);
+        self.drift(dt);
+    }
+
+    /// Finds the velocities after `dt` seconds under motors and friction. `friction` is the floor's coefficient at a point
+    /// of the room.
+    pub fn kick(&mut self, drives: [WheelDrive; 2], friction: impl Fn(Vector2<f64>) -> f64, dt: f64) {
+        // Contacts as they will stand at the end of the substep, where the friction law has to hold.
+        let heading = self.heading + self.velocity.yaw_rate * dt;
+        let (sin, cos) = sin_cos(heading);
+        let to_room = |v: Vector2<f64>| Vector2::new(cos * v.x - sin * v.y, sin * v.x + cos * v.y);
+        let ahead = self.position + self.velocity.linear * dt;
+
+        let start = {
+            let v = self.velocity.linear;
+            (Vector2::new(cos * v.x + sin * v.y, cos * v.y - sin * v.x), self.velocity.yaw_rate)
+        };
+        let (mut linear, mut yaw_rate) = start;
+        let mut limits = [0.0; 3];
+        for (foot, limit) in self.feet.iter_mut().zip(&mut limits) {
+            let mu = friction(ahead + to_room(foot.place)) * foot.friction_share;
+            *limit = mu * foot.load * dt;
+            let length = foot.impulse.norm();
+            if length > *limit {
+                foot.impulse *= *limit / length;
+            }
+            linear += foot.impulse / self.mass;
+            yaw_rate += crate::geometry::cross(foot.place, foot.impulse) / self.yaw_inertia;
+        }
+
+        let respond = |k: usize, along: f64| {
+            let wheel = &self.wheels[k];
+            let r = wheel.respond(&self.wheel_states[k], drives[k], along * wheel.radius_m, dt);
+            (r.speed, wheel.radius_m, r.inverse_inertia * wheel.radius_m * wheel.radius_m)
+        };
+        for _ in 0..MAX_SWEEPS {
+            let mut change: f64 = 0.0;
+            for (k, (foot, &limit)) in self.feet.iter_mut().zip(&limits).enumerate() {
+                if limit <= 0.0 {
+                    continue;
+                }
+                let r = foot.place;
+                let mut slip = Vector2::new(linear.x - yaw_rate * r.y, linear.y + yaw_rate * r.x);
+                let mut a = InverseMass {
+                    xx: 1.0 / self.mass + r.y * r.y / self.yaw_inertia,
+                    xy: -r.x * r.y / self.yaw_inertia,
+                    yy: 1.0 / self.mass + r.x * r.x / self.yaw_inertia,
+                };
+                if k < 2 {
+                    let (speed, radius, inverse_mass) = respond(k, foot.impulse.x);
+                    slip.x -= speed * radius;
+                    a.xx += inverse_mass;
+                }
+                let b = a.apply(foot.impulse) - slip;
+                let impulse = friction_impulse(&a, b, self.creep / limit, limit);
+                let delta = impulse - foot.impulse;
+                foot.impulse = impulse;
+                linear += delta / self.mass;
+                yaw_rate += crate::geometry::cross(r, delta) / self.yaw_inertia;
+                change = change.max(delta.x.abs().max(delta.y.abs()) / limit);
+            }
+            if change <= CONVERGED {
+                break;
+            }
+        }
+
+        let speeds: [f64; 2] = std::array::from_fn(|k| respond(k, self.feet[k].impulse.x).0);
+        for k in 0..2 {
+            self.wheels[k].finish(&mut self.wheel_states[k], drives[k], speeds[k], dt);
+            let r = self.feet[k].place;
+            let rolling = self.wheel_states[k].speed * self.wheels[k].radius_m;
+            self.slip[k] =
+                Vector2::new(flushed(linear.x - yaw_rate * r.y - rolling), flushed(linear.y + yaw_rate * r.x));
+        }
+        for foot in &mut self.feet {
+            foot.impulse = foot.impulse.map(flushed);
+        }
+        self.velocity_before = self.velocity;
+        self.velocity = PlanarVelocity { linear: to_room(linear.map(flushed)), yaw_rate: flushed(yaw_rate) };
+    }
+
+    /// Moves for `dt` seconds with the mean of the velocities before and after the last kick.
+    pub fn drift(&mut self, dt: f64) {
+        self.position += (self.velocity_before.linear + self.velocity.linear) * (0.5 * dt);
+        self.heading += 0.5 * (self.velocity_before.yaw_rate + self.velocity.yaw_rate) * dt;
+    }
+
+    /// Takes over what contact with a wall or body made of the substep: the displacement of the axle's middle, the change of
+    /// heading, and the velocity.
+    pub fn adopt(&mut self, displacement: Vector2<f64>, turn: f64, velocity: PlanarVelocity) {
+        let axle = self.pose().position() + displacement;
+        self.heading += turn;
+        let (s, c) = sin_cos(self.heading);
+        self.position = axle + Vector2::new(c, s) * self.cog_ahead;
+        self.velocity = velocity;
+    }
+}
+
+fn into_body(v: Vector2<f64>, heading: f64) -> Vector2<f64> {
+    let (s, c) = sin_cos(heading);
+    Vector2::new(c * v.x + s * v.y, c * v.y - s * v.x)
+}
