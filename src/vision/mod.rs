@@ -1,1 +1,269 @@
-//! vision
+//! Vision: panoramas in, landmark bearings out.
+//!
+//! The [`Extractor`] is made from the home panorama, whose features become the landmarks, and then finds them again in every
+//! panorama that follows. Features are upright blobs in scale space (`pyramid`, `detect`), described by gradient
+//! histograms (`describe`), matched by descriptor distance (`matching`) and checked against the one planar motion
+//! that must explain them all (`motion`). Once that motion is known, matches that were too ambiguous at first are
+//! taken where they fit it, which is what keeps landmarks in sight far from home.
+//!
+//! Only azimuths leave this module: elevations, scales and the motion found serve to refuse wrong matches and are not
+//! handed on. SURF, which the homing literature uses, is not: this detector is an open one.
+
+mod describe;
+mod detect;
+mod matching;
+mod motion;
+mod pyramid;
+
+use serde::{Deserialize, Serialize};
+
+use crate::geometry::{Vector2, direction};
+use crate::observation::{Bearing, HomeSnapshot, LandmarkId};
+use crate::panorama::{Panorama, Projection};
+use crate::random::Seed;
+
+use describe::{Describer, Descriptor};
+use detect::Feature;
+use matching::{Candidate, Choice, Gallery};
+use motion::{CHI2_LIMIT, Pair, Sight};
+use pyramid::Pyramid;
+
+/// Settings of the extractor. The defaults suit 1440 x 180 pixels.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct ExtractorSettings {
+    /// Octaves of the scale space; fewer are built where the panorama is too small.
+    pub octaves: usize,
+    /// Least strength of a feature: difference of neighbouring Gaussian images, grey levels of 255.
+    pub contrast: f32,
+    /// Largest ratio of a feature's curvatures along its two axes: above, it is an edge.
+    pub edge_ratio: f32,
+    /// Most features kept of a panorama.
+    pub features: usize,
+    /// Most features kept of the home panorama.
+    pub home_features: usize,
+    /// Features compete for their place with those within this azimuth on either side, rad.
+    pub spread_rad: f64,
+    /// Edge of one of the 4 x 4 cells of a descriptor in units of the feature's scale.
+    pub cell: f32,
+    /// Horizontal stretches at which home features are described: a wall seen from elsewhere is seen at another slant.
+    pub stretches: Vec<f32>,
+    /// Tolerance of the agreement in height over size: an absolute and a relative part.
+    pub height_slack: (f32, f32),
+    /// Largest squared descriptor distance of a match, as a share of that of unrelated descriptors.
+    pub distance: f32,
+    /// Largest ratio of a match's squared descriptor distance to the runner-up's, before the motion is known.
+    pub ratio: f32,
+    /// The same among those candidates that fit the motion.
+    pub guided_ratio: f32,
+    /// Pairs of matches tried as the motion.
+    pub draws: usize,
+    /// Standard deviation of a feature's position: a constant part, pixels.
+    pub sd_px: f64,
+    /// Standard deviation of a feature's position: a part in proportion to its scale (pixels a pixel).
+    pub sd_per_scale: f64,
+    /// Seed of the draws.
+    pub seed: u64,
+}
+
+impl Default for ExtractorSettings {
+    fn default() -> Self {
+        Self {
+            octaves: 4,
+            contrast: 2.0,
+            edge_ratio: 10.0,
+            features: 600,
+            home_features: 600,
+            spread_rad: 0.15,
+            cell: 2.5,
+            stretches: vec![0.7, 1.0, 1.4],
+            height_slack: (1.0, 0.35),
+            distance: 0.35,
+            ratio: 0.8,
+            guided_ratio: 0.95,
+            draws: 300,
+            sd_px: 0.25,
+            sd_per_scale: 0.2,
+            seed: 0,
+        }
+    }
+}
+
+/// A landmark of the home panorama found in the current one, with what scoring needs.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Match {
+    /// The landmark: index of the home feature.
+    pub id: LandmarkId,
+    /// Column and row in the home panorama, pixels.
+    pub home_px: (f64, f64),
+    /// Column and row in the current panorama, pixels.
+    pub now_px: (f64, f64),
+    /// Scale in the home panorama, pixels.
+    pub home_scale_px: f64,
+    /// Scale in the current panorama, pixels.
+    pub now_scale_px: f64,
+    /// Squared descriptor distance, 0 (equal) to 1 (nothing in common).
+    pub distance: f64,
+    /// Standard deviation of the bearing in the home panorama, rad.
+    pub home_sd_rad: f64,
+    /// Standard deviation of the current bearing, rad.
+    pub now_sd_rad: f64,
+}
+
+/// Finds the landmarks of the home panorama in later ones. Every observation stands alone: the same panorama always gives
+/// the same bearings.
+pub struct Extractor {
+    settings: ExtractorSettings,
+    describer: Describer,
+    pyramid: Pyramid,
+    home_projection: Projection,
+    home: Vec<Feature>,
+    home_sights: Vec<Sight>,
+    gallery: Gallery,
+    now: Vec<Feature>,
+    descriptors: Vec<Descriptor>,
+    candidates: Vec<Candidate>,
+    matches: Vec<Match>,
+}
+
+impl Extractor {
+    /// Makes the features of `home` the landmarks.
+    #[must_use]
+    pub fn new(settings: ExtractorSettings, home: &Panorama) -> Self {
+        let mut pyramid = Pyramid::default();
+        let describer = Describer::new();
+        let mut features = Vec::new();
+        pyramid.build(home, settings.octaves);
+        detect::detect(&pyramid, &settings, settings.home_features, &mut features);
+        let projection = home.projection;
+        let stretches = if settings.stretches.is_empty() { &[1.0][..] } else { &settings.stretches };
+        let descriptors = features
+            .iter()
+            .flat_map(|f| stretches.iter().map(|s| describer.describe(&pyramid, f, settings.cell, *s)).collect::<Vec<_>>())
+            .collect();
+        let gallery = Gallery::new(&features, descriptors, stretches.len(), horizon(&projection));
+        let home_sights = features.iter().map(|f| sight(f, &projection, &settings)).collect();
+        Self {
+            settings,
+            describer,
+            pyramid,
+            home_projection: projection,
+            home: features,
+            home_sights,
+            gallery,
+            now: Vec::new(),
+            descriptors: Vec::new(),
+            candidates: Vec::new(),
+            matches: Vec::new(),
+        }
+    }
+
+    /// One bearing per home feature; its id is the feature's index.
+    #[must_use]
+    pub fn home_snapshot(&self) -> HomeSnapshot {
+        let bearings = self
+            .home
+            .iter()
+            .enumerate()
+            .map(|(k, f)| Bearing {
+                id: LandmarkId(k as u32),
+                azimuth_rad: self.home_projection.azimuth(f64::from(f.x)),
+                sd_rad: sd_rad(f, &self.home_projection, &self.settings),
+            })
+            .collect();
+        HomeSnapshot { bearings }
+    }
+
+    /// Bearings of the landmarks found in `now`, in the order of their ids, each at most once.
+    pub fn observe(&mut self, now: &Panorama) -> Vec<Bearing> {
+        self.look(now);
+        let projection = now.projection;
+        self.matches
+            .iter()
+            .map(|m| Bearing { id: m.id, azimuth_rad: projection.azimuth(m.now_px.0), sd_rad: m.now_sd_rad })
+            .collect()
+    }
+
+    /// The matches behind the last observation, in the same order.
+    #[must_use]
+    pub fn matches(&self) -> &[Match] {
+        &self.matches
+    }
+
+    fn look(&mut self, now: &Panorama) {
+        let settings = &self.settings;
+        let projection = now.projection;
+        self.matches.clear();
+        self.pyramid.build(now, settings.octaves);
+        detect::detect(&self.pyramid, settings, settings.features, &mut self.now);
+        self.descriptors.clear();
+        self.descriptors.extend(self.now.iter().map(|f| self.describer.describe(&self.pyramid, f, settings.cell, 1.0)));
+        self.gallery.compare(
+            &self.home,
+            &self.now,
+            &self.descriptors,
+            horizon(&projection),
+            settings.height_slack,
+            &mut self.candidates,
+        );
+        let sights: Vec<Sight> = self.now.iter().map(|f| sight(f, &projection, settings)).collect();
+        let pair = |c: &Choice| Pair { home: self.home_sights[c.candidate.home], now: sights[c.candidate.now] };
+        let first = matching::choose(&self.candidates, &self.home, &self.now, settings.distance, settings.ratio, |_| true);
+        let pairs: Vec<Pair> = first.iter().map(pair).collect();
+        let Some(found) = motion::estimate(&pairs, settings.draws, Seed(settings.seed)) else { return };
+        // With the motion known, ambiguous matches are taken where they fit it; then once more with the motion of all.
+        let mut motion = found;
+        let mut chosen = Vec::new();
+        for _ in 0..2 {
+            let frame = motion.frame();
+            chosen = matching::choose(
+                &self.candidates,
+                &self.home,
+                &self.now,
+                settings.distance,
+                settings.guided_ratio,
+                |c| {
+                    let fit = frame.fit(&self.home_sights[c.home], &sights[c.now], false);
+                    fit.possible && fit.chi2 < CHI2_LIMIT
+                },
+            );
+            let pairs: Vec<Pair> = chosen.iter().map(pair).collect();
+            motion = motion::polish(&pairs, motion);
+        }
+        chosen.sort_by_key(|c| c.candidate.home);
+        for choice in &chosen {
+            let (home, now) = (&self.home[choice.candidate.home], &self.now[choice.candidate.now]);
+            self.matches.push(Match {
+                id: LandmarkId(choice.candidate.home as u32),
+                home_px: (f64::from(home.x), f64::from(home.y)),
+                now_px: (f64::from(now.x), f64::from(now.y)),
+                home_scale_px: f64::from(home.sigma),
+                now_scale_px: f64::from(now.sigma),
+                distance: f64::from(choice.candidate.distance),
+                home_sd_rad: sd_rad(home, &self.home_projection, settings),
+                now_sd_rad: sd_rad(now, &projection, settings),
+            });
+        }
+    }
+}
+
+/// Row of the horizon, counted from the centre of row 0.
+fn horizon(projection: &Projection) -> f32 {
+    (projection.horizon_row - 0.5) as f32
+}
+
+fn sd_rad(feature: &Feature, projection: &Projection, settings: &ExtractorSettings) -> f64 {
+    let scaled = settings.sd_per_scale * f64::from(feature.sigma);
+    (settings.sd_px * settings.sd_px + scaled * scaled).sqrt() * projection.pixel_rad()
+}
+
+fn sight(feature: &Feature, projection: &Projection, settings: &ExtractorSettings) -> Sight {
+    let sd = sd_rad(feature, projection, settings);
+    let unit: Vector2<f64> = direction(projection.azimuth(f64::from(feature.x)));
+    Sight {
+        unit,
+        tan: projection.tan_elevation(f64::from(feature.y)),
+        variance: sd * sd,
+        scale: f64::from(feature.sigma) * projection.pixel_rad(),
+    }
+}

@@ -1,0 +1,135 @@
+//! Descriptor matching between the home panorama and the current one.
+//!
+//! The camera keeps its height, so a landmark's elevation and its scale change together: rows above the horizon over scale is
+//! the landmark's height over its size, wherever it is seen from. Only features that agree in this number are compared at
+//! all, which saves most of the work and many wrong matches.
+
+use super::describe::{DISTANCE_SCALE, Descriptor, distance};
+use super::detect::Feature;
+
+/// Two features that may be the same landmark.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Candidate {
+    /// Index of the current feature.
+    pub now: usize,
+    /// Index of the home feature.
+    pub home: usize,
+    /// Squared descriptor distance, 0 (equal) to 1 (nothing in common).
+    pub distance: f32,
+}
+
+/// A candidate that stands out from its rivals.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Choice {
+    /// The candidate.
+    pub candidate: Candidate,
+    /// Its distance over that of the runner-up (both squared); small is distinct.
+    pub ratio: f32,
+}
+
+/// Features of the home panorama, ready to be matched.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Gallery {
+    /// Home features sorted by height over size, with their index.
+    order: Vec<(f32, usize)>,
+    /// Descriptors of feature k in `variants` horizontal stretches, from k * variants on.
+    descriptors: Vec<Descriptor>,
+    variants: usize,
+}
+
+/// Height over size: rows above the horizon in units of the scale.
+fn height_over_size(feature: &Feature, horizon: f32) -> f32 {
+    (horizon - feature.y) / feature.sigma
+}
+
+impl Gallery {
+    pub fn new(features: &[Feature], descriptors: Vec<Descriptor>, variants: usize, horizon: f32) -> Self {
+        let mut order: Vec<_> = features.iter().enumerate().map(|(k, f)| (height_over_size(f, horizon), k)).collect();
+        order.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        Self { order, descriptors, variants }
+    }
+
+    /// Compares all features that agree in height over size. Candidates come grouped by current feature.
+    pub fn compare(
+        &self,
+        home: &[Feature],
+        now: &[Feature],
+        descriptors: &[Descriptor],
+        horizon: f32,
+        slack: (f32, f32),
+        candidates: &mut Vec<Candidate>,
+    ) {
+        candidates.clear();
+        for (n, (feature, descriptor)) in now.iter().zip(descriptors).enumerate() {
+            let height = height_over_size(feature, horizon);
+            let reach = slack.0 + slack.1 * height.abs();
+            let from = self.order.partition_point(|(h, _)| *h < height - reach);
+            for &(_, k) in self.order[from..].iter().take_while(|(h, _)| *h <= height + reach) {
+                let ratio = feature.sigma / home[k].sigma;
+                if !(0.22..4.5).contains(&ratio) {
+                    continue;
+                }
+                let variants = &self.descriptors[k * self.variants..(k + 1) * self.variants];
+                let best = variants.iter().map(|d| distance(descriptor, d)).min().unwrap_or(u32::MAX);
+                candidates.push(Candidate { now: n, home: k, distance: best as f32 / DISTANCE_SCALE });
+            }
+        }
+    }
+}
+
+/// Nearest neighbours both ways among the candidates that `allowed` lets pass, with a distance of at most `limit` and at most
+/// `max_ratio` times the runner-up's. Rivals at the same place (a blob found twice) do not count against a match. Sorted from
+/// the most to the least distinct.
+pub(super) fn choose(
+    candidates: &[Candidate],
+    home: &[Feature],
+    now: &[Feature],
+    limit: f32,
+    max_ratio: f32,
+    allowed: impl Fn(&Candidate) -> bool,
+) -> Vec<Choice> {
+    let mut best_of_home: Vec<Option<Candidate>> = vec![None; home.len()];
+    let mut rows = Vec::new();
+    for group in candidates.chunk_by(|a, b| a.now == b.now) {
+        let mut best: Option<Candidate> = None;
+        let mut kept = Vec::new();
+        for candidate in group.iter().filter(|c| allowed(c)) {
+            kept.push(*candidate);
+            if best.is_none_or(|b| candidate.distance < b.distance) {
+                best = Some(*candidate);
+            }
+            let rival = &mut best_of_home[candidate.home];
+            if rival.is_none_or(|r| candidate.distance < r.distance) {
+                *rival = Some(*candidate);
+            }
+        }
+        let Some(best) = best else { continue };
+        let second = kept
+            .iter()
+            .filter(|c| !same_place(&home[c.home], &home[best.home]))
+            .map(|c| c.distance)
+            .fold(f32::INFINITY, f32::min);
+        rows.push((best, second));
+    }
+    let mut choices: Vec<_> = rows
+        .into_iter()
+        .map(|(candidate, second)| Choice { candidate, ratio: candidate.distance / second.max(1e-6) })
+        .filter(|c| c.candidate.distance <= limit && c.ratio <= max_ratio)
+        .filter(|c| {
+            best_of_home[c.candidate.home]
+                .is_some_and(|r| r.now == c.candidate.now || same_place(&now[r.now], &now[c.candidate.now]))
+        })
+        .collect();
+    // Each home feature once, the nearest first.
+    choices.sort_by(|a, b| {
+        a.candidate.home.cmp(&b.candidate.home).then(a.candidate.distance.total_cmp(&b.candidate.distance)).then(a.candidate.now.cmp(&b.candidate.now))
+    });
+    choices.dedup_by_key(|c| c.candidate.home);
+    choices.sort_by(|a, b| a.ratio.total_cmp(&b.ratio).then(a.candidate.home.cmp(&b.candidate.home)));
+    choices
+}
+
+fn same_place(a: &Feature, b: &Feature) -> bool {
+    let near = 1.0 * a.sigma.min(b.sigma);
+    (a.x - b.x).abs() < near && (a.y - b.y).abs() < near
+}
