@@ -4,13 +4,45 @@ use std::path::Path;
 
 use sha2::{Digest, Sha256};
 
+use super::polygon::anticlockwise;
 use super::spec::{ShapeSpec, TextureSpec, WorldSpec};
 use super::{Body, Footprint, World, Zone};
 use crate::error::{Error, Result};
 use crate::geometry::{Pose, Vector2};
 use crate::panorama::INSTANCE_FIRST_WALL;
 
+/// The worlds that the program carries with it, as (name, TOML text).
+const BUILTIN: [(&str, &str); 1] = [("lab", include_str!("../../worlds/lab.toml"))];
+
 impl World {
+    /// Opens a world by what a person typed: the path of a file if there is one, else the name of a built-in world, as `NAME`
+    /// or `worlds/NAME.toml`.
+    ///
+    /// # Errors
+    /// When there is neither, and as [`World::load`].
+    pub fn open(argument: &str) -> Result<Self> {
+        let path = Path::new(argument);
+        if path.is_file() {
+            return Self::load(path);
+        }
+        let bare = argument.strip_prefix("worlds/").unwrap_or(argument);
+        let bare = bare.strip_suffix(".toml").unwrap_or(bare);
+        match BUILTIN.iter().find(|(name, _)| *name == bare) {
+            Some((name, text)) => Self::from_toml(text, &format!("builtin:{name}")),
+            None => Err(Error::Invalid {
+                what: "world".to_owned(),
+                found: format!("{argument}, which is no file"),
+                allowed: format!("a world file (TOML or JSON), or a built-in world: {}", Self::builtin_names().join(", ")),
+            }),
+        }
+    }
+
+    /// Names of the built-in worlds.
+    #[must_use]
+    pub fn builtin_names() -> Vec<&'static str> {
+        BUILTIN.iter().map(|(name, _)| *name).collect()
+    }
+
     /// Loads and checks a world file: TOML, or JSON where the name ends in `.json`.
     ///
     /// # Errors
@@ -18,14 +50,31 @@ impl World {
     pub fn load(path: &Path) -> Result<Self> {
         let text =
             std::fs::read_to_string(path).map_err(|source| Error::Io { action: "read", path: path.to_owned(), source })?;
-        let parse_error = |message: String| Error::Parse { path: path.to_owned(), message };
-        let spec: WorldSpec = if path.extension().is_some_and(|e| e == "json") {
-            serde_json::from_str(&text).map_err(|e| parse_error(e.to_string()))?
+        if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("json")) {
+            Self::from_json(&text, path)
         } else {
-            toml::from_str(&text).map_err(|e| parse_error(e.to_string()))?
-        };
-        let sha256 = Sha256::digest(text.as_bytes()).iter().map(|b| format!("{b:02x}")).collect();
-        Ok(Self::resolve(spec, path, sha256))
+            Self::from_toml(&text, path)
+        }
+    }
+
+    /// Checks a world given as TOML text. `source` names it in messages.
+    ///
+    /// # Errors
+    /// As [`World::load`].
+    pub fn from_toml(text: &str, source: impl AsRef<Path>) -> Result<Self> {
+        let path = source.as_ref();
+        let spec = toml::from_str(text).map_err(|e| Error::Parse { path: path.to_owned(), message: e.to_string() })?;
+        Ok(Self::resolve(spec, path, sha256(text)))
+    }
+
+    /// Checks a world given as JSON text. `source` names it in messages.
+    ///
+    /// # Errors
+    /// As [`World::load`].
+    pub fn from_json(text: &str, source: impl AsRef<Path>) -> Result<Self> {
+        let path = source.as_ref();
+        let spec = serde_json::from_str(text).map_err(|e| Error::Parse { path: path.to_owned(), message: e.to_string() })?;
+        Ok(Self::resolve(spec, path, sha256(text)))
     }
 
     fn resolve(spec: WorldSpec, source: &Path, sha256: String) -> Self {
@@ -65,12 +114,8 @@ impl World {
                 instance: first_body + k as u16,
             })
             .collect();
-        let zones = spec
-            .floor
-            .zones
-            .iter()
-            .map(|z| Zone { polygon: anticlockwise(&z.polygon_m), friction: z.friction })
-            .collect();
+        let zones =
+            spec.floor.zones.iter().map(|z| Zone { polygon: anticlockwise(&z.polygon_m), friction: z.friction }).collect();
         let home = Pose::new(spec.home.x_m, spec.home.y_m, spec.home.heading_deg.to_radians());
         Self {
             wall_textures,
@@ -88,13 +133,7 @@ impl World {
     }
 }
 
-/// The corners in anti-clockwise order, starting with the first as written.
-fn anticlockwise(corners: &[[f64; 2]]) -> Vec<Vector2<f64>> {
-    let mut corners: Vec<_> = corners.iter().map(|c| Vector2::new(c[0], c[1])).collect();
-    let doubled_area: f64 =
-        (0..corners.len()).map(|k| crate::geometry::cross(corners[k], corners[(k + 1) % corners.len()])).sum();
-    if doubled_area < 0.0 {
-        corners[1..].reverse();
-    }
-    corners
+/// SHA-256 of a text's bytes, lower-case hexadecimal.
+fn sha256(text: &str) -> String {
+    Sha256::digest(text.as_bytes()).iter().map(|b| format!("{b:02x}")).collect()
 }

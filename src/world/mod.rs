@@ -3,7 +3,10 @@
 //! [`WorldSpec`] is the file as written, [`World`] the checked form: absolute corners, radians, instance ids. Loading reports
 //! every fault of a file at once; see [`WorldFault`].
 
+pub mod convex;
+mod free;
 mod load;
+pub mod polygon;
 pub mod spec;
 
 use std::path::PathBuf;
