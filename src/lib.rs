@@ -11,6 +11,7 @@ pub mod physics;
 pub mod random;
 pub mod render;
 pub mod report;
+pub mod study;
 pub mod vision;
 pub mod world;
 
