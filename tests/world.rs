@@ -28,13 +28,3 @@ fn random_starts_keep_their_promises() {
         assert_eq!(quadrants, [true; 4], "{name}: starts lie all round home");
     }
 }
-#[test]
-fn dump() {
-    std::fs::write("/tmp/schema.json", serde_json::to_string_pretty(&World::json_schema()).unwrap()).unwrap();
-}
-#[test]
-fn dump2() {
-    for f in ["/tmp/bad.toml", "/tmp/bad2.toml"] {
-        println!("{}", World::open(f).unwrap_err());
-    }
-}

@@ -16,7 +16,14 @@ use crate::geometry::{Pose, Vector2};
 use crate::panorama::INSTANCE_FIRST_WALL;
 
 /// The worlds that the program carries with it, as (name, TOML text).
-const BUILTIN: [(&str, &str); 1] = [("lab", include_str!("../../worlds/lab.toml"))];
+const BUILTIN: [(&str, &str); 6] = [
+    ("lab", include_str!("../../worlds/lab.toml")),
+    ("slippery", include_str!("../../worlds/slippery.toml")),
+    ("crowd", include_str!("../../worlds/crowd.toml")),
+    ("paper-ideal", include_str!("../../worlds/paper-ideal.toml")),
+    ("paper-grid", include_str!("../../worlds/paper-grid.toml")),
+    ("vardy-hall", include_str!("../../worlds/vardy-hall.toml")),
+];
 
 impl World {
     /// Opens a world by what a person typed: the path of a file if there is one, else the name of a built-in world, as `NAME`

@@ -101,7 +101,7 @@ impl<'s> Walk<'s> {
                 self.node(node, schema, &place);
                 return true;
             }
-            let allowed = format!("the fields {}", field_names(properties));
+            let allowed = format!("one of {}", field_names(properties));
             self.findings.unknown.push(fault(&place, "an unknown field".to_owned(), allowed));
             false
         });
@@ -149,7 +149,8 @@ impl<'s> Walk<'s> {
         }
         let allowed: Vec<String> = resolved.iter().filter(|s| types_of(s) != ["null"]).map(|s| describe(s)).collect();
         let found = node.describe();
-        self.unreadable(place, found, allowed.join(" or "));
+        let separator = if resolved.iter().all(|s| s.get("const").is_some()) { ", " } else { " or " };
+        self.unreadable(place, found, allowed.join(separator));
     }
 }
 
