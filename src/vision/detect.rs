@@ -25,11 +25,17 @@ pub(super) struct Feature {
 
 /// Finds the features of a pyramid and keeps the strongest, spread over azimuth and scale, in an order that depends on the
 /// picture only.
-pub(super) fn detect(pyramid: &Pyramid, settings: &ExtractorSettings, limit: usize, features: &mut Vec<Feature>) {
+pub(super) fn detect(
+    pyramid: &Pyramid,
+    settings: &ExtractorSettings,
+    limit: usize,
+    scratch: &mut Scratch,
+    features: &mut Vec<Feature>,
+) {
     features.clear();
     let layers = 2 * pyramid.octaves.len();
     for layer in 0..layers - 1 {
-        scan(pyramid, layer, settings, features);
+        scan(pyramid, layer, settings, scratch, features);
     }
     let width = pyramid.octaves[0].gauss[0].width as f32;
     spread(features, width, settings.spread_rad as f32 / std::f32::consts::TAU * width, limit);
@@ -41,31 +47,17 @@ fn layer_of(pyramid: &Pyramid, layer: usize) -> (&Image, f32, f32) {
     (&octave.difference[layer % 2], octave.step_x, octave.step_y)
 }
 
-fn scan(pyramid: &Pyramid, layer: usize, settings: &ExtractorSettings, features: &mut Vec<Feature>) {
+fn scan(pyramid: &Pyramid, layer: usize, settings: &ExtractorSettings, scratch: &mut Scratch, features: &mut Vec<Feature>) {
     let (image, step_x, step_y) = layer_of(pyramid, layer);
     let (width, height) = (image.width, image.height);
-    let threshold = settings.contrast;
     for y in 1..height - 1 {
-        let (above, row, below) = (image.row(y - 1), image.row(y), image.row(y + 1));
-        for x in 0..width {
-            let value = row[x];
-            if value.abs() < threshold {
-                continue;
-            }
+        let rows = [image.row(y - 1), image.row(y), image.row(y + 1)];
+        scratch.find(rows, settings.contrast);
+        for &x in &scratch.found {
             let (left, right) = (if x == 0 { width - 1 } else { x - 1 }, if x + 1 == width { 0 } else { x + 1 });
+            let patch = rows.map(|row| [row[left], row[x], row[right]]);
+            let value = patch[1][1];
             let sign = value.signum();
-            // Ties go to the first in reading order, so a flat top is found once.
-            let beaten = sign * row[left] >= sign * value
-                || sign * row[right] > sign * value
-                || sign * above[x] >= sign * value
-                || sign * below[x] > sign * value
-                || sign * above[left] >= sign * value
-                || sign * above[right] >= sign * value
-                || sign * below[left] > sign * value
-                || sign * below[right] > sign * value;
-            if beaten {
-                continue;
-            }
             let (xf, yf) = (x as f32, y as f32);
             let other = |layer: usize, x: f32, y: f32| {
                 let (image, sx, sy) = layer_of(pyramid, layer);
@@ -77,14 +69,9 @@ fn scan(pyramid: &Pyramid, layer: usize, settings: &ExtractorSettings, features:
                     .all(|&(dx, dy)| other(layer, xf + dx, yf + dy) < sign * value)
             };
             // The finest layer has none below it: what is smallest there may be smaller still, and is taken as it is.
-            if (layer > 0 && !tops(layer - 1)) || !tops(layer + 1) {
+            if !tops(layer + 1) || (layer > 0 && !tops(layer - 1)) {
                 continue;
             }
-            let patch = [
-                [above[left], above[x], above[right]],
-                [row[left], value, row[right]],
-                [below[left], below[x], below[right]],
-            ];
             let Some((dx, dy, peak)) = refine(&patch, settings.edge_ratio) else { continue };
             let (xr, yr) = (xf + dx, yf + dy);
             let shift = if layer == 0 {
@@ -96,9 +83,8 @@ fn scan(pyramid: &Pyramid, layer: usize, settings: &ExtractorSettings, features:
             };
             // Mean of the two images' standard deviations: a layer's two Gaussians are sqrt 2 apart.
             let sigma = BASE_SIGMA * 1.189_207_1 * libm::exp2f(0.5 * (layer as f32 + shift));
-            let columns = width as f32;
             features.push(Feature {
-                x: xr.rem_euclid(columns) * step_x,
+                x: xr.rem_euclid(width as f32) * step_x,
                 y: yr * step_y,
                 sigma,
                 octave: layer / 2,
@@ -107,6 +93,60 @@ fn scan(pyramid: &Pyramid, layer: usize, settings: &ExtractorSettings, features:
             });
         }
     }
+}
+
+/// Buffers of the scan.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Scratch {
+    high: Vec<f32>,
+    low: Vec<f32>,
+    mask: Vec<u8>,
+    found: Vec<usize>,
+}
+
+impl Scratch {
+    /// Fills `found` with the columns whose value in the middle row is above `threshold` and above all eight neighbours, or
+    /// below both the negative threshold and all neighbours. Written as plain loops over whole rows, which vectorise; few
+    /// pixels are left for the costlier tests.
+    fn find(&mut self, rows: [&[f32]; 3], threshold: f32) {
+        let [above, row, below] = rows;
+        let width = row.len();
+        self.high.resize(width + 2, 0.0);
+        self.low.resize(width + 2, 0.0);
+        self.mask.resize(width.next_multiple_of(8), 0);
+        // Extremes of each column's three pixels, with a copy of the other end on either side.
+        let columns = above.iter().zip(row).zip(below);
+        for ((high, low), ((a, b), c)) in self.high[1..=width].iter_mut().zip(&mut self.low[1..=width]).zip(columns) {
+            *high = larger(larger(*a, *b), *c);
+            *low = smaller(smaller(*a, *b), *c);
+        }
+        (self.high[0], self.high[width + 1]) = (self.high[width], self.high[1]);
+        (self.low[0], self.low[width + 1]) = (self.low[width], self.low[1]);
+        let high = self.high[..width].iter().zip(&self.high[2..]);
+        let low = self.low[..width].iter().zip(&self.low[2..]);
+        let columns = above.iter().zip(row).zip(below);
+        for (((mask, (h0, h1)), (l0, l1)), ((a, b), c)) in self.mask.iter_mut().zip(high).zip(low).zip(columns) {
+            let top = larger(larger(larger(*h0, *h1), larger(*a, *c)), threshold);
+            let bottom = smaller(smaller(smaller(*l0, *l1), smaller(*a, *c)), -threshold);
+            *mask = u8::from(*b > top) | u8::from(*b < bottom);
+        }
+        self.found.clear();
+        for (k, eight) in self.mask.as_chunks::<8>().0.iter().enumerate() {
+            if u64::from_ne_bytes(*eight) != 0 {
+                self.found.extend((0..8).filter(|&i| eight[i] != 0).map(|i| 8 * k + i));
+            }
+        }
+    }
+}
+
+/// The larger of two numbers; unlike `f32::max` one instruction, since NaN does not occur here.
+fn larger(a: f32, b: f32) -> f32 {
+    if a > b { a } else { b }
+}
+
+/// The smaller of two numbers.
+fn smaller(a: f32, b: f32) -> f32 {
+    if a < b { a } else { b }
 }
 
 /// Fits a quadric to a 3 x 3 patch. Returns the offset of its extremum and the value there, or `None` for an edge (the
@@ -135,26 +175,38 @@ fn refine(p: &[[f32; 3]; 3], edge_ratio: f32) -> Option<(f32, f32, f32)> {
 /// ranked stay: rich corners of the room do not crowd out the poor ones, and no sector border makes a turn of the robot
 /// change the choice.
 fn spread(features: &mut Vec<Feature>, width: f32, reach: f32, limit: usize) {
-    features.sort_by(|a, b| a.octave.cmp(&b.octave).then(a.x.total_cmp(&b.x)).then(a.y.total_cmp(&b.y)).then(a.level.cmp(&b.level)));
-    if features.len() <= limit {
-        return;
-    }
-    let mut ranked = Vec::with_capacity(features.len());
-    for class in features.chunk_by(|a, b| a.octave == b.octave) {
-        let n = class.len();
-        let gap = |i: usize, j: usize| (class[j % n].x - class[i % n].x).rem_euclid(width);
-        for (i, feature) in class.iter().enumerate() {
-            let strength = feature.response.abs();
-            let ahead = (1..n).map(|k| i + k).take_while(|&j| gap(i, j) <= reach);
-            let behind = (1..n).map(|k| i + n - k).take_while(|&j| gap(j, i) <= reach);
-            let stronger = |j: &usize| class[j % n].response.abs() > strength;
-            let rank = ahead.filter(stronger).count() + behind.filter(stronger).count();
-            ranked.push((rank, *feature));
+    let by_strength = |a: &Feature, b: &Feature| b.response.abs().total_cmp(&a.response.abs());
+    let by_place = |a: &Feature, b: &Feature| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)).then(a.sigma.total_cmp(&b.sigma));
+    if features.len() > limit {
+        // The stable sort keeps the order of equals, which is that of the picture.
+        features.sort_by(|a, b| a.octave.cmp(&b.octave).then(a.x.total_cmp(&b.x)));
+        let mut ranked = Vec::with_capacity(features.len());
+        let (mut places, mut strengths) = (Vec::new(), Vec::new());
+        for class in features.chunk_by(|a, b| a.octave == b.octave) {
+            // Three turns in a row, so that windows across the seam are slices too.
+            places.clear();
+            strengths.clear();
+            for turn in [-width, 0.0, width] {
+                places.extend(class.iter().map(|f| f.x + turn));
+                strengths.extend(class.iter().map(|f| f.response.abs()));
+            }
+            let (mut from, mut to) = (0, 0);
+            for feature in class {
+                while places[from] < feature.x - reach {
+                    from += 1;
+                }
+                while to < places.len() && places[to] <= feature.x + reach {
+                    to += 1;
+                }
+                let strength = feature.response.abs();
+                let rank: u32 = strengths[from..to].iter().map(|s| u32::from(*s > strength)).sum();
+                ranked.push((rank, *feature));
+            }
         }
+        ranked.sort_by(|a, b| a.0.cmp(&b.0).then_with(|| by_strength(&a.1, &b.1)).then_with(|| by_place(&a.1, &b.1)));
+        ranked.truncate(limit);
+        features.clear();
+        features.extend(ranked.into_iter().map(|(_, feature)| feature));
     }
-    ranked.sort_by(|a, b| a.0.cmp(&b.0).then(b.1.response.abs().total_cmp(&a.1.response.abs())));
-    ranked.truncate(limit);
-    features.clear();
-    features.extend(ranked.into_iter().map(|(_, feature)| feature));
-    features.sort_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)).then(a.sigma.total_cmp(&b.sigma)));
+    features.sort_by(by_place);
 }

@@ -49,7 +49,8 @@ impl Gallery {
         Self { order, descriptors, variants }
     }
 
-    /// Compares all features that agree in height over size. Candidates come grouped by current feature.
+    /// Compares all features that agree in height over size. Candidates come grouped by current feature; those with a distance
+    /// above `limit` are left out.
     pub fn compare(
         &self,
         home: &[Feature],
@@ -57,6 +58,7 @@ impl Gallery {
         descriptors: &[Descriptor],
         horizon: f32,
         slack: (f32, f32),
+        limit: f32,
         candidates: &mut Vec<Candidate>,
     ) {
         candidates.clear();
@@ -71,7 +73,10 @@ impl Gallery {
                 }
                 let variants = &self.descriptors[k * self.variants..(k + 1) * self.variants];
                 let best = variants.iter().map(|d| distance(descriptor, d)).min().unwrap_or(u32::MAX);
-                candidates.push(Candidate { now: n, home: k, distance: best as f32 / DISTANCE_SCALE });
+                let distance = best as f32 / DISTANCE_SCALE;
+                if distance <= limit {
+                    candidates.push(Candidate { now: n, home: k, distance });
+                }
             }
         }
     }

@@ -23,7 +23,7 @@ use crate::panorama::{Panorama, Projection};
 use crate::random::Seed;
 
 use describe::{Describer, Descriptor};
-use detect::Feature;
+use detect::{Feature, Scratch};
 use matching::{Candidate, Choice, Gallery};
 use motion::{CHI2_LIMIT, Pair, Sight};
 use pyramid::Pyramid;
@@ -116,6 +116,7 @@ pub struct Extractor {
     settings: ExtractorSettings,
     describer: Describer,
     pyramid: Pyramid,
+    scratch: Scratch,
     home_projection: Projection,
     home: Vec<Feature>,
     home_sights: Vec<Sight>,
@@ -132,9 +133,10 @@ impl Extractor {
     pub fn new(settings: ExtractorSettings, home: &Panorama) -> Self {
         let mut pyramid = Pyramid::default();
         let describer = Describer::new();
+        let mut scratch = Scratch::default();
         let mut features = Vec::new();
         pyramid.build(home, settings.octaves);
-        detect::detect(&pyramid, &settings, settings.home_features, &mut features);
+        detect::detect(&pyramid, &settings, settings.home_features, &mut scratch, &mut features);
         let projection = home.projection;
         let stretches = if settings.stretches.is_empty() { &[1.0][..] } else { &settings.stretches };
         let descriptors = features
@@ -147,6 +149,7 @@ impl Extractor {
             settings,
             describer,
             pyramid,
+            scratch,
             home_projection: projection,
             home: features,
             home_sights,
@@ -195,7 +198,7 @@ impl Extractor {
         let projection = now.projection;
         self.matches.clear();
         self.pyramid.build(now, settings.octaves);
-        detect::detect(&self.pyramid, settings, settings.features, &mut self.now);
+        detect::detect(&self.pyramid, settings, settings.features, &mut self.scratch, &mut self.now);
         self.descriptors.clear();
         self.descriptors.extend(self.now.iter().map(|f| self.describer.describe(&self.pyramid, f, settings.cell, 1.0)));
         self.gallery.compare(
@@ -204,6 +207,7 @@ impl Extractor {
             &self.descriptors,
             horizon(&projection),
             settings.height_slack,
+            1.5 * settings.distance,
             &mut self.candidates,
         );
         let sights: Vec<Sight> = self.now.iter().map(|f| sight(f, &projection, settings)).collect();

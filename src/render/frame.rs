@@ -1,0 +1,268 @@
+//! What one view needs beside its scene: tables of directions and rows, and the geometry as seen from the camera.
+//!
+//! Both renderers work from these tables. They are computed here once, in f64, with the camera as origin, and rounded to f32:
+//! the two then start from the same bits, and a surface 3 m away is not blurred by a room that lies far from the origin.
+
+use bytemuck::{Pod, Zeroable};
+
+use super::{Scene, View};
+use crate::error::{Error, Result};
+use crate::geometry::{Pose, Vector2, cross, sin_cos};
+use crate::panorama::Projection;
+use crate::world::Footprint;
+
+/// Distance that stands for "never", m. Finite, because shaders may assume that no infinities occur.
+pub(super) const FAR: f32 = 1.0e9;
+
+/// One edge of the outline or of a polygonal footprint. The layout is that of `Edge` in `shaders/columns.wgsl`.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+pub(super) struct Edge {
+    /// Unit normal: into the room for a wall, out of the body for a footprint.
+    pub normal: [f32; 2],
+    /// Unit vector from the first to the second corner.
+    pub tangent: [f32; 2],
+    /// Normal times first corner, m.
+    pub distance: f32,
+    /// Tangent times first corner, m.
+    pub along: f32,
+    /// Texture coordinate u of the first corner, m.
+    pub u: f32,
+    /// Length, m.
+    pub length: f32,
+}
+
+/// A body where it stands now. The layout is that of `Body` in `shaders/columns.wgsl`.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+pub(super) struct Body {
+    /// Origin of the body's frame, m.
+    pub centre: [f32; 2],
+    /// Cosine and sine of its heading.
+    pub heading: [f32; 2],
+    /// Height of the underside, m.
+    pub bottom: f32,
+    /// Height of the top, m.
+    pub top: f32,
+    /// Radius of a disc, m; 0 for a polygon.
+    pub radius: f32,
+    /// First edge of a polygon.
+    pub first_edge: u32,
+    /// Number of edges of a polygon.
+    pub edge_count: u32,
+    /// Fills up to 48 bytes.
+    pub padding: [u32; 3],
+}
+
+/// A lamp. The layout is that of `Lamp` in `shaders/shade.wgsl`.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+pub(super) struct Lamp {
+    /// Horizontal position from the camera, m.
+    pub position: [f32; 2],
+    /// Height above the floor, m.
+    pub height: f32,
+    /// Irradiance that a facing surface gets at 1 m.
+    pub intensity: f32,
+}
+
+/// One row of the picture. The layout is that of `Row` in `shaders/columns.wgsl`.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+pub(super) struct Row {
+    /// Tangent of the elevation.
+    pub tan: f32,
+    /// Its inverse, at most [`FAR`] in magnitude.
+    pub inverse_tan: f32,
+    /// Straight-line distance per horizontal distance.
+    pub stretch: f32,
+    /// Horizontal distance at which floor or ceiling is met, m.
+    pub plane: f32,
+}
+
+/// Numbers of the whole view. The layout is that of `Params` in `shaders/columns.wgsl`.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+pub(super) struct Params {
+    pub width: u32,
+    pub height: u32,
+    pub wall_count: u32,
+    pub body_count: u32,
+    pub lamp_count: u32,
+    /// Rows that one invocation of the shader renders; the CPU has no use for it.
+    pub rows_per_invocation: u32,
+    /// Angle between columns, rad.
+    pub pixel_rad: f32,
+    /// Height of the camera above the floor, m.
+    pub camera_height: f32,
+    /// Position of the camera in the room, m.
+    pub camera: [f32; 2],
+    /// Height of the room, m.
+    pub room_height: f32,
+    /// Ambient light.
+    pub ambient: f32,
+}
+
+/// All tables of one view. Kept by a renderer and refilled view by view without allocating.
+#[derive(Debug)]
+pub(super) struct Frame {
+    pub params: Params,
+    /// Unit vectors of the columns in the room's axes.
+    pub directions: Vec<[f32; 2]>,
+    pub rows: Vec<Row>,
+    /// First the walls, then the edges of polygonal bodies.
+    pub edges: Vec<Edge>,
+    pub bodies: Vec<Body>,
+    pub lamps: Vec<Lamp>,
+    /// Unit vectors of the columns for a camera that faces along x, and the width that they are for.
+    circle: Vec<Vector2<f64>>,
+}
+
+impl Frame {
+    pub fn new() -> Self {
+        Self {
+            params: Params::zeroed(),
+            directions: Vec::new(),
+            rows: Vec::new(),
+            edges: Vec::new(),
+            bodies: Vec::new(),
+            lamps: Vec::new(),
+            circle: Vec::new(),
+        }
+    }
+
+    /// Fills the tables for `view`.
+    ///
+    /// # Errors
+    /// When the picture has no pixels, a number is not finite, or the view does not pose each body of the scene.
+    pub fn prepare(&mut self, scene: &Scene, view: &View<'_>) -> Result<()> {
+        check(scene, view)?;
+        let projection = view.projection;
+        let camera = view.robot.position();
+        self.fill_directions(&projection, view.robot.heading);
+        self.fill_rows(&projection, scene);
+        self.edges.clear();
+        push_edges(&mut self.edges, scene.outline.iter().map(|&p| p - camera), -1.0);
+        self.bodies.clear();
+        for (prism, pose) in scene.bodies.iter().zip(view.bodies) {
+            self.push_body(&prism.footprint, prism.bottom_m, prism.top_m, pose, camera);
+        }
+        self.lamps.clear();
+        self.lamps.extend(scene.lamps.iter().map(|l| {
+            let [x, y, z] = l.position_m;
+            let position = [(x - camera.x) as f32, (y - camera.y) as f32];
+            Lamp { position, height: z as f32, intensity: l.intensity as f32 }
+        }));
+        self.params = Params {
+            width: projection.width,
+            height: projection.height,
+            wall_count: scene.outline.len() as u32,
+            body_count: self.bodies.len() as u32,
+            lamp_count: self.lamps.len() as u32,
+            rows_per_invocation: projection.height,
+            pixel_rad: projection.pixel_rad() as f32,
+            camera_height: scene.camera_height_m as f32,
+            camera: [camera.x as f32, camera.y as f32],
+            room_height: scene.room_height_m as f32,
+            ambient: scene.ambient as f32,
+        };
+        Ok(())
+    }
+
+    fn fill_directions(&mut self, projection: &Projection, heading: f64) {
+        let width = projection.width as usize;
+        if self.circle.len() != width {
+            let step = projection.pixel_rad();
+            self.circle.clear();
+            self.circle.extend((0..width).map(|c| crate::geometry::direction(c as f64 * step)));
+        }
+        // Rotating a table of the circle costs four products a column; sine and cosine of each would cost ten times that.
+        let (s, c) = sin_cos(heading + projection.mount_rad);
+        self.directions.clear();
+        self.directions.extend(self.circle.iter().map(|d| [(c * d.x - s * d.y) as f32, (s * d.x + c * d.y) as f32]));
+    }
+
+    fn fill_rows(&mut self, projection: &Projection, scene: &Scene) {
+        let far = f64::from(FAR);
+        let above = scene.room_height_m - scene.camera_height_m;
+        let below = -scene.camera_height_m;
+        self.rows.clear();
+        self.rows.extend((0..projection.height).map(|row| {
+            let tan = projection.tan_elevation(f64::from(row));
+            let inverse = if tan.abs() * far > 1.0 { 1.0 / tan } else { far };
+            let plane = (if tan < 0.0 { below } else { above }) * inverse;
+            Row {
+                tan: tan as f32,
+                inverse_tan: inverse as f32,
+                stretch: (1.0 + tan * tan).sqrt() as f32,
+                plane: plane.min(far) as f32,
+            }
+        }));
+    }
+
+    fn push_body(&mut self, footprint: &Footprint, bottom: f64, top: f64, pose: &Pose, camera: Vector2<f64>) {
+        let (s, c) = sin_cos(pose.heading);
+        let centre = pose.position() - camera;
+        let first_edge = self.edges.len() as u32;
+        let radius = match footprint {
+            Footprint::Disc(radius) => *radius,
+            Footprint::Polygon(corners) => {
+                let place = |p: &Vector2<f64>| centre + Vector2::new(c * p.x - s * p.y, s * p.x + c * p.y);
+                push_edges(&mut self.edges, corners.iter().map(place), 1.0);
+                0.0
+            }
+        };
+        self.bodies.push(Body {
+            centre: [centre.x as f32, centre.y as f32],
+            heading: [c as f32, s as f32],
+            bottom: bottom as f32,
+            top: top as f32,
+            radius: radius as f32,
+            first_edge,
+            edge_count: self.edges.len() as u32 - first_edge,
+            padding: [0; 3],
+        });
+    }
+}
+
+/// Appends the edges of an anti-clockwise polygon. `side` is 1 for normals that point out of it, -1 for normals into it.
+fn push_edges(edges: &mut Vec<Edge>, corners: impl Iterator<Item = Vector2<f64>> + Clone, side: f64) {
+    let mut u = 0.0;
+    let next = corners.clone().cycle().skip(1);
+    for (a, b) in corners.zip(next) {
+        let length = ((b.x - a.x) * (b.x - a.x) + (b.y - a.y) * (b.y - a.y)).sqrt();
+        let tangent = (b - a) / length.max(1e-9);
+        let normal = Vector2::new(tangent.y, -tangent.x) * side;
+        edges.push(Edge {
+            normal: [normal.x as f32, normal.y as f32],
+            tangent: [tangent.x as f32, tangent.y as f32],
+            distance: (-side * cross(tangent, a)) as f32,
+            along: (tangent.x * a.x + tangent.y * a.y) as f32,
+            u: if side > 0.0 { u as f32 } else { 0.0 },
+            length: length as f32,
+        });
+        u += length;
+    }
+}
+
+fn check(scene: &Scene, view: &View<'_>) -> Result<()> {
+    let invalid = |what: &str, found: String, allowed: String| Err(Error::Invalid { what: what.to_owned(), found, allowed });
+    let p = &view.projection;
+    if p.width == 0 || p.height == 0 || p.pixels() > (1 << 28) {
+        return invalid("panorama size", format!("{} x {}", p.width, p.height), "1 to 2^28 pixels".to_owned());
+    }
+    if !(p.horizon_row.is_finite() && p.mount_rad.is_finite()) {
+        return invalid("projection", format!("{p:?}"), "finite numbers".to_owned());
+    }
+    if !view.robot.is_finite() {
+        return invalid("robot pose", format!("{:?}", view.robot), "finite numbers".to_owned());
+    }
+    if view.bodies.len() != scene.bodies.len() {
+        let allowed = format!("{}, one for each body", scene.bodies.len());
+        return invalid("number of body poses", view.bodies.len().to_string(), allowed);
+    }
+    if let Some(pose) = view.bodies.iter().find(|b| !b.is_finite()) {
+        return invalid("body pose", format!("{pose:?}"), "finite numbers".to_owned());
+    }
+    Ok(())
+}
