@@ -83,7 +83,7 @@ fn format_faults(path: &std::path::Path, faults: &[WorldFault]) -> String {
     use std::fmt::Write;
     let mut text = format!("{}: {} fault{}", path.display(), faults.len(), if faults.len() == 1 { "" } else { "s" });
     for f in faults {
-        let _ = write!(text, "\n  {}: found {}, allowed is {}", f.place, f.found, f.allowed);
+        let _ = write!(text, "\n  {f}");
     }
     text
 }

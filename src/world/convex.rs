@@ -84,7 +84,7 @@ fn core_gap(a: &[Vector2<f64>], b: &[Vector2<f64>]) -> f64 {
     to_edges(a, b).min(to_edges(b, a))
 }
 
-/// Largest signed distance between the projections of `a` and `b`, over the normals of the edges of `a`, both ways round.
+/// Largest signed distance between the projections of `a` and `b`, over the normals of the edges of `a`.
 fn largest_separation(a: &[Vector2<f64>], b: &[Vector2<f64>]) -> f64 {
     let mut largest = f64::NEG_INFINITY;
     for (p, q) in edges(a) {
@@ -94,7 +94,9 @@ fn largest_separation(a: &[Vector2<f64>], b: &[Vector2<f64>]) -> f64 {
             continue;
         }
         let normal = Vector2::new(along.y, -along.x) / length;
-        for n in [normal, -normal] {
+        // A segment also ends: beyond its ends it is its own direction that separates.
+        let ends = if a.len() == 2 { along / length } else { normal };
+        for n in [normal, -normal, ends, -ends] {
             let reach = a.iter().map(|v| n.dot(v)).fold(f64::NEG_INFINITY, f64::max);
             let nearest = b.iter().map(|v| n.dot(v)).fold(f64::INFINITY, f64::min);
             largest = largest.max(nearest - reach);
@@ -141,6 +143,11 @@ mod tests {
         close(square(0.0, 0.0, 0.0).gap_m(&disc(0.3, 0.0, 0.1)), -0.3);
         let corridor = Convex::corridor(Vector2::new(-3.0, 0.8), Vector2::new(3.0, 0.8), 0.2);
         close(square(0.0, 0.0, 0.0).gap_m(&corridor), 0.1);
+        // In line with a segment, beyond its end, beside it and on it.
+        close(corridor.gap_m(&disc(5.0, 0.8, 0.5)), 1.3);
+        close(corridor.gap_m(&Convex::corridor(Vector2::new(4.0, 0.8), Vector2::new(7.0, 0.8), 0.5)), 0.3);
+        close(corridor.gap_m(&disc(1.0, 1.8, 0.5)), 0.3);
+        close(corridor.gap_m(&disc(1.0, 0.8, 0.5)), -0.7);
     }
 
     #[test]

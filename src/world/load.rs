@@ -2,17 +2,28 @@
 
 use std::path::Path;
 
+use serde::Deserialize;
 use sha2::{Digest, Sha256};
 
+use super::document::Node;
 use super::polygon::anticlockwise;
 use super::spec::{ShapeSpec, TextureSpec, WorldSpec};
+use super::structure::{self, Findings};
+use super::validate;
 use super::{Body, Footprint, World, Zone};
 use crate::error::{Error, Result};
 use crate::geometry::{Pose, Vector2};
 use crate::panorama::INSTANCE_FIRST_WALL;
 
 /// The worlds that the program carries with it, as (name, TOML text).
-const BUILTIN: [(&str, &str); 1] = [("lab", include_str!("../../worlds/lab.toml"))];
+const BUILTIN: [(&str, &str); 6] = [
+    ("lab", include_str!("../../worlds/lab.toml")),
+    ("slippery", include_str!("../../worlds/slippery.toml")),
+    ("crowd", include_str!("../../worlds/crowd.toml")),
+    ("paper-ideal", include_str!("../../worlds/paper-ideal.toml")),
+    ("paper-grid", include_str!("../../worlds/paper-grid.toml")),
+    ("vardy-hall", include_str!("../../worlds/vardy-hall.toml")),
+];
 
 impl World {
     /// Opens a world by what a person typed: the path of a file if there is one, else the name of a built-in world, as `NAME`
@@ -28,7 +39,7 @@ impl World {
         let bare = argument.strip_prefix("worlds/").unwrap_or(argument);
         let bare = bare.strip_suffix(".toml").unwrap_or(bare);
         match BUILTIN.iter().find(|(name, _)| *name == bare) {
-            Some((name, text)) => Self::from_toml(text, &format!("builtin:{name}")),
+            Some((name, text)) => Self::from_toml(text, format!("builtin:{name}")),
             None => Err(Error::Invalid {
                 what: "world".to_owned(),
                 found: format!("{argument}, which is no file"),
@@ -57,14 +68,18 @@ impl World {
         }
     }
 
+    /// JSON Schema of the world file (draft 2020-12).
+    #[must_use]
+    pub fn json_schema() -> serde_json::Value {
+        schemars::schema_for!(WorldSpec).to_value()
+    }
+
     /// Checks a world given as TOML text. `source` names it in messages.
     ///
     /// # Errors
     /// As [`World::load`].
     pub fn from_toml(text: &str, source: impl AsRef<Path>) -> Result<Self> {
-        let path = source.as_ref();
-        let spec = toml::from_str(text).map_err(|e| Error::Parse { path: path.to_owned(), message: e.to_string() })?;
-        Ok(Self::resolve(spec, path, sha256(text)))
+        Self::from_tree(Node::from_toml(text, source.as_ref())?, source.as_ref(), sha256(text))
     }
 
     /// Checks a world given as JSON text. `source` names it in messages.
@@ -72,19 +87,57 @@ impl World {
     /// # Errors
     /// As [`World::load`].
     pub fn from_json(text: &str, source: impl AsRef<Path>) -> Result<Self> {
-        let path = source.as_ref();
-        let spec = serde_json::from_str(text).map_err(|e| Error::Parse { path: path.to_owned(), message: e.to_string() })?;
-        Ok(Self::resolve(spec, path, sha256(text)))
+        Self::from_tree(Node::from_json(text, source.as_ref())?, source.as_ref(), sha256(text))
     }
 
-    fn resolve(spec: WorldSpec, source: &Path, sha256: String) -> Self {
+    /// Checks a world that a program made or changed. `source` names it in messages; the SHA-256 is that of its JSON form.
+    ///
+    /// # Errors
+    /// When it has faults; all of them come at once.
+    pub fn from_spec(spec: &WorldSpec, source: impl AsRef<Path>) -> Result<Self> {
+        let parse_error = |message: String| Error::Parse { path: source.as_ref().to_owned(), message };
+        let tree = Node::from_spec(spec).map_err(|e| parse_error(e.to_string()))?;
+        let json = serde_json::to_string(spec).map_err(|e| parse_error(e.to_string()))?;
+        Self::from_tree(tree, source.as_ref(), sha256(&json))
+    }
+
+    fn from_tree(mut tree: Node, path: &Path, sha256: String) -> Result<Self> {
+        let as_read = tree.clone(); // the check below removes unknown fields, whose lines are still wanted
+        let Findings { unknown, not_finite, unreadable } = structure::check(&mut tree, &Self::json_schema());
+        let mut faults = unknown;
+        if unreadable.is_empty() {
+            let spec =
+                WorldSpec::deserialize(tree).map_err(|e| Error::Parse { path: path.to_owned(), message: e.to_string() })?;
+            faults.extend(validate::check(&spec, &not_finite));
+            if faults.is_empty() && not_finite.is_empty() {
+                return Ok(Self::resolve(spec, path, sha256));
+            }
+        }
+        faults.extend(not_finite);
+        faults.extend(unreadable);
+        for fault in &mut faults {
+            (fault.line, fault.owner) = as_read.locate(&fault.place);
+        }
+        faults.sort_by_key(|f| f.line); // in reading order where lines are known, else as found
+        Err(Error::World { path: path.to_owned(), faults })
+    }
+
+    /// The checked form of a spec that has no faults. Never panics where the room has none.
+    pub(super) fn resolve(spec: WorldSpec, source: &Path, sha256: String) -> Self {
         let outline = anticlockwise(&spec.room.outline_m);
+        let clockwise = outline.get(1).is_some_and(|c| [c.x, c.y] != spec.room.outline_m[1]);
         let seeded = |texture: &TextureSpec, n: u64| TextureSpec {
             seed: Some(texture.seed.unwrap_or_else(|| spec.seed.wrapping_mul(1000).wrapping_add(n))),
             ..*texture
         };
         let walls = &spec.room.walls;
-        let wall_textures: Vec<_> = (0..outline.len()).map(|k| seeded(&walls[k % walls.len()], 10 + k as u64)).collect();
+        let wall_textures: Vec<_> = (0..outline.len())
+            .map(|k| {
+                // A clockwise outline is turned round; its walls keep the textures that they have in the file.
+                let as_written = if clockwise { outline.len() - 1 - k } else { k };
+                seeded(&walls[as_written % walls.len()], 10 + as_written as u64)
+            })
+            .collect();
         let first_body = INSTANCE_FIRST_WALL + outline.len() as u16;
         let bodies = spec
             .landmarks

@@ -4,10 +4,13 @@
 //! every fault of a file at once; see [`WorldFault`].
 
 pub mod convex;
+mod document;
 mod free;
 mod load;
 pub mod polygon;
 pub mod spec;
+mod structure;
+mod validate;
 
 use std::path::PathBuf;
 
@@ -24,6 +27,23 @@ pub struct WorldFault {
     pub found: String,
     /// What is allowed.
     pub allowed: String,
+    /// Name of the body, zone or start that the place belongs to.
+    pub owner: Option<String>,
+    /// Line of the place, from 1, where the file's format tells it.
+    pub line: Option<usize>,
+}
+
+impl std::fmt::Display for WorldFault {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        if let Some(line) = self.line {
+            write!(f, "line {line}: ")?;
+        }
+        write!(f, "{}", self.place)?;
+        if let Some(owner) = &self.owner {
+            write!(f, " (\"{owner}\")")?;
+        }
+        write!(f, ": found {}, allowed is {}", self.found, self.allowed)
+    }
 }
 
 /// A checked world.
