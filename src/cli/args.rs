@@ -3,7 +3,7 @@
 use std::ops::RangeInclusive;
 use std::path::PathBuf;
 
-use clap::builder::{PossibleValuesParser, TypedValueParser};
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Parser, Subcommand};
 use wayhome::episode::method::{LawKind, MethodKind};
 use wayhome::episode::{Bearings, PlantKind, Start};
@@ -62,19 +62,19 @@ pub struct HomeArgs {
     #[arg(default_value = "worlds/lab.toml")]
     pub world: String,
     /// What moves when the wheels are commanded
-    #[arg(long, value_enum, default_value = "rapier")]
+    #[arg(long, default_value = "rapier", value_parser = choice(PLANTS))]
     pub plant: PlantKind,
     /// Where bearings come from
-    #[arg(long, value_enum, default_value = "rendered")]
+    #[arg(long, default_value = "rendered", value_parser = choice(BEARINGS))]
     pub bearings: Bearings,
     /// Homing method
-    #[arg(long, value_enum, default_value = "anchored-ekf")]
+    #[arg(long, default_value = "anchored-ekf", value_parser = choice(METHODS))]
     pub method: MethodKind,
     /// Steering law of the methods that estimate where home is
-    #[arg(long, value_enum, default_value = "proportional")]
+    #[arg(long, default_value = "proportional", value_parser = choice(LAWS))]
     pub controller: LawKind,
     /// What renders
-    #[arg(long, default_value = "auto", value_parser = renderer())]
+    #[arg(long, default_value = "auto", value_parser = choice(RENDERERS))]
     pub renderer: RendererChoice,
     /// Columns and rows of the panorama, 16x8 to 16384x4096 [default: the world's]
     #[arg(long, value_name = "WxH", value_parser = size)]
@@ -120,7 +120,7 @@ pub struct RenderArgs {
     #[arg(long, value_name = "WxH", value_parser = size)]
     pub size: Option<(u32, u32)>,
     /// What renders
-    #[arg(long, default_value = "auto", value_parser = renderer())]
+    #[arg(long, default_value = "auto", value_parser = choice(RENDERERS))]
     pub renderer: RendererChoice,
     /// Folder for the results [default: results/runs/render-WORLD]
     #[arg(long, value_name = "DIR")]
@@ -154,12 +154,42 @@ pub enum WorldCommand {
     Schema,
 }
 
-/// The renderers by name.
-fn renderer() -> impl TypedValueParser<Value = RendererChoice> {
-    PossibleValuesParser::new(["auto", "gpu", "cpu"]).map(|name| match name.as_str() {
-        "gpu" => RendererChoice::Gpu,
-        "cpu" => RendererChoice::Cpu,
-        _ => RendererChoice::Auto,
+/// A value of the library, what it is called here, and what `--help` says of it.
+type Choice<T> = (T, &'static str, &'static str);
+
+const PLANTS: &[Choice<PlantKind>] = &[
+    (PlantKind::Rapier, "rapier", "Wheels that slip, motors, encoders, collisions"),
+    (PlantKind::Unicycle, "unicycle", "The unicycle's kinematics with perfect odometry; nothing stops it"),
+];
+
+const BEARINGS: &[Choice<Bearings>] = &[
+    (Bearings::Rendered, "rendered", "Features of rendered panoramas, found again from the home panorama"),
+    (Bearings::Ideal, "ideal", "True bearings of the landmark bodies' centres, where nothing hides them"),
+    (Bearings::Noisy, "noisy", "Ideal bearings with noise, drop-outs and false matches"),
+];
+
+const METHODS: &[Choice<MethodKind>] = &[
+    (MethodKind::AnchoredEkf, "anchored-ekf", "Filter that starts from nothing and anchors home when it can"),
+    (MethodKind::PaperEkf, "paper-ekf", "The paper's filter on three landmarks, started at a supposed pose"),
+    (MethodKind::Alv, "alv", "Average landmark vector without a compass; no estimate"),
+];
+
+const LAWS: &[Choice<LawKind>] = &[
+    (LawKind::Proportional, "proportional", "Turn rate proportional to the heading error"),
+    (LawKind::Lyapunov, "lyapunov", "The paper's switching law"),
+];
+
+const RENDERERS: &[Choice<RendererChoice>] = &[
+    (RendererChoice::Auto, "auto", "A hardware GPU where there is one, else the CPU"),
+    (RendererChoice::Gpu, "gpu", "Any graphics adapter, a software one included"),
+    (RendererChoice::Cpu, "cpu", "The CPU"),
+];
+
+/// Reads one of `choices` by its name.
+fn choice<T: Copy + Send + Sync + 'static>(choices: &'static [Choice<T>]) -> impl TypedValueParser<Value = T> {
+    let names = choices.iter().map(|(_, name, help)| PossibleValue::new(*name).help(*help));
+    PossibleValuesParser::new(names).try_map(|given| {
+        choices.iter().find(|(_, name, _)| *name == given).map(|(value, ..)| *value).ok_or("unknown name")
     })
 }
 
@@ -232,6 +262,19 @@ mod tests {
     #[test]
     fn the_command_line_is_consistent() {
         Args::command().debug_assert();
+    }
+
+    #[test]
+    fn choices_are_called_what_files_call_them() {
+        fn check<T: serde::Serialize>(choices: &[Choice<T>]) {
+            for (value, name, _) in choices {
+                assert_eq!(serde_json::to_value(value).unwrap(), *name);
+            }
+        }
+        check(PLANTS);
+        check(BEARINGS);
+        check(METHODS);
+        check(LAWS);
     }
 
     #[test]

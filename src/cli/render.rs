@@ -95,7 +95,7 @@ pub fn run(args: &RenderArgs, context: &Context) -> Result<Verdict> {
 fn check_place(world: &World, pose: Pose) -> Result<(), Error> {
     let refuse = |reason: String| Error::Invalid {
         what: "--pose".into(),
-        found: format!("{} m, {} m, which is {reason}", pose.x, pose.y),
+        found: format!("({}, {}) m, {reason}", pose.x, pose.y),
         allowed: "a place in the room and outside its bodies".into(),
     };
     if !polygon::contains(&world.outline, pose.position()) {

@@ -20,24 +20,24 @@ use crate::vision::ExtractorSettings;
 use crate::world::{TaskSpec, World};
 
 /// What moves when the wheels are commanded.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, clap::ValueEnum)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum PlantKind {
-    /// Wheels that slip, motors, encoders, collisions
+    /// Wheels that slip, motors, encoders, collisions.
     Rapier,
-    /// The unicycle's kinematics with perfect odometry, walls and bodies do not stop it
+    /// The unicycle's kinematics with perfect odometry; walls and bodies do not stop it.
     Unicycle,
 }
 
 /// Where bearings come from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, clap::ValueEnum)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Bearings {
-    /// Features of rendered panoramas, matched to those of the home panorama
+    /// Features of rendered panoramas, matched to those of the home panorama.
     Rendered,
-    /// True bearings of the landmark bodies' centres, hidden by what stands in between
+    /// True bearings of the landmark bodies' centres, hidden by what stands in between.
     Ideal,
-    /// Ideal bearings with noise, drop-outs and false matches
+    /// Ideal bearings with noise, drop-outs and false matches.
     Noisy,
 }
 
@@ -120,7 +120,7 @@ impl Setup {
         };
         world.is_free(&pose, 0.0, &world.body_poses()).map_err(|reason| Error::Invalid {
             what: "start".into(),
-            found: format!("{} m, {} m: {reason}", pose.x, pose.y),
+            found: format!("({}, {}) m, where {reason} is in the way", pose.x, pose.y),
             allowed: format!("a place in world `{}` where the robot can stand", world.spec.name),
         })?;
         Ok(pose)

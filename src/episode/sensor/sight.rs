@@ -1,6 +1,7 @@
 //! Lines of sight in the plane of the camera's height.
 
 use crate::geometry::{Pose, Vector2, cross};
+use crate::world::polygon::edges;
 use crate::world::{Footprint, World};
 
 /// Whether something stands between `camera` and the centre of body `target`, with the bodies at `bodies`.
@@ -32,11 +33,6 @@ fn behind_a_wall(world: &World, camera: Vector2<f64>, goal: Vector2<f64>, footpr
     };
     let range_m = (goal - camera).norm();
     edges(&world.outline).any(|(p, q)| crossing(camera, goal, p, q).is_some_and(|share| share * range_m < range_m - reach_m))
-}
-
-/// The edges of a closed polygon.
-fn edges(corners: &[Vector2<f64>]) -> impl Iterator<Item = (Vector2<f64>, Vector2<f64>)> {
-    (0..corners.len()).map(|k| (corners[k], corners[(k + 1) % corners.len()]))
 }
 
 /// Distance of the segment from `a` to `b` to the origin.
