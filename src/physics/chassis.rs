@@ -245,8 +245,7 @@ impl Chassis {
             self.wheels[k].finish(&mut self.wheel_states[k], drives[k], speeds[k], dt);
             let r = self.feet[k].place;
             let rolling = self.wheel_states[k].speed * self.wheels[k].radius_m;
-            self.slip[k] =
-                Vector2::new(flushed(linear.x - yaw_rate * r.y - rolling), flushed(linear.y + yaw_rate * r.x));
+            self.slip[k] = Vector2::new(flushed(linear.x - yaw_rate * r.y - rolling), flushed(linear.y + yaw_rate * r.x));
         }
         for foot in &mut self.feet {
             foot.impulse = foot.impulse.map(flushed);

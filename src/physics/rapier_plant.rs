@@ -64,10 +64,7 @@ impl RapierPlant {
     /// Adds to the robot's velocity at once, as a push from outside does. The wheels learn of it through the floor.
     pub fn push(&mut self, change: PlanarVelocity) {
         let v = self.chassis.velocity();
-        self.chassis.set_velocity(PlanarVelocity {
-            linear: v.linear + change.linear,
-            yaw_rate: v.yaw_rate + change.yaw_rate,
-        });
+        self.chassis.set_velocity(PlanarVelocity { linear: v.linear + change.linear, yaw_rate: v.yaw_rate + change.yaw_rate });
     }
 }
 

@@ -1,3 +1,5 @@
 //! stand-in
 /// x
-pub fn world_svg(_w: &crate::world::World) -> String { "<svg/>".into() }
+pub fn world_svg(_w: &crate::world::World) -> String {
+    "<svg/>".into()
+}
