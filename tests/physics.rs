@@ -3,6 +3,8 @@
 //! Closed forms hold for a robot with its weight on the two wheels alone (centre of gravity above the axle) and equal
 //! wheels. Where the chassis alone is driven, nothing of rapier takes part; where a plant is, all of it does.
 
+#![allow(clippy::unwrap_used)]
+
 use std::f64::consts::{FRAC_PI_2, PI};
 
 use wayhome::geometry::{Pose, Twist, Vector2, cross, wrap};
@@ -368,9 +370,7 @@ fn a_crowded_room_holds_the_robot_and_its_walkers() {
 /// The walker's region above, cut at its reflex corner (0, 0.6) into three triangles.
 fn inside_convex_pieces(r: &[[f64; 2]; 5], p: Vector2<f64>) -> bool {
     let side = |a: [f64; 2], b: [f64; 2]| (b[0] - a[0]) * (p.y - a[1]) - (b[1] - a[1]) * (p.x - a[0]) > -1e-9;
-    [[0, 1, 3], [1, 2, 3], [0, 3, 4]]
-        .iter()
-        .any(|t| side(r[t[0]], r[t[1]]) && side(r[t[1]], r[t[2]]) && side(r[t[2]], r[t[0]]))
+    [[0, 1, 3], [1, 2, 3], [0, 3, 4]].iter().any(|t| side(r[t[0]], r[t[1]]) && side(r[t[1]], r[t[2]]) && side(r[t[2]], r[t[0]]))
 }
 
 #[test]

@@ -20,7 +20,7 @@ pub const STANDARD_GRAVITY_M_S2: f64 = 9.81;
 /// Gauss-Seidel sweeps at most. Ordinary driving takes three to five.
 const MAX_SWEEPS: usize = 50;
 /// A sweep that changes no impulse by more than this share of its friction limit is the last.
-const CONVERGED: f64 = 1e-11;
+const CONVERGED: f64 = 1e-9;
 
 /// Velocity of the centre of gravity in the room's frame, m/s, and yaw rate, rad/s.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -32,7 +32,7 @@ pub struct PlanarVelocity {
 }
 
 /// A contact with the floor: the left wheel, the right wheel, the caster.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 struct Foot {
     /// Place from the centre of gravity in the body's frame, m.
     place: Vector2<f64>,
@@ -42,6 +42,10 @@ struct Foot {
     friction_share: f64,
     /// Friction impulse of the last substep in the body's frame, N s: where the next search starts.
     impulse: Vector2<f64>,
+    /// The friction solver's multiplier at that impulse, 1/kg.
+    lambda: f64,
+    /// The body's inverse mass as felt here, 1/kg.
+    body: InverseMass,
 }
 
 /// The robot: rigid body, wheels, motors and their contacts with the floor.
@@ -49,6 +53,7 @@ struct Foot {
 pub struct Chassis {
     mass: f64,
     yaw_inertia: f64,
+    inertia: Inertia,
     cog_ahead: f64,
     creep: f64,
     feet: [Foot; 3],
@@ -72,17 +77,25 @@ impl Chassis {
         let cog = robot.centre_of_gravity_m;
         let weight = robot.mass_kg * STANDARD_GRAVITY_M_S2;
         let caster_share = if robot.caster_m == 0.0 { 0.0 } else { (cog / robot.caster_m).clamp(0.0, 1.0) };
-        let foot = |x: f64, y: f64, share: f64, friction_share: f64| Foot {
-            place: Vector2::new(x - cog, y),
-            load: weight * share,
-            friction_share,
-            impulse: Vector2::zeros(),
+        let yaw_inertia = robot.yaw_inertia_kg_m2.unwrap_or(0.5 * robot.mass_kg * robot.radius_m * robot.radius_m);
+        let inertia = Inertia { inverse_mass: 1.0 / robot.mass_kg, inverse_yaw_inertia: 1.0 / yaw_inertia };
+        let foot = |x: f64, y: f64, share: f64, friction_share: f64| {
+            let place = Vector2::new(x - cog, y);
+            Foot {
+                place,
+                load: weight * share,
+                friction_share,
+                impulse: Vector2::zeros(),
+                lambda: 0.0,
+                body: inertia.felt_at(place),
+            }
         };
         let wheel_share = 0.5 * (1.0 - caster_share);
         let half_track = 0.5 * robot.track_m;
         Self {
             mass: robot.mass_kg,
-            yaw_inertia: robot.yaw_inertia_kg_m2.unwrap_or(0.5 * robot.mass_kg * robot.radius_m * robot.radius_m),
+            yaw_inertia,
+            inertia,
             cog_ahead: cog,
             creep: robot.creep_m_s,
             feet: [
@@ -209,7 +222,7 @@ impl Chassis {
             if length > *limit {
                 foot.impulse *= *limit / length;
             }
-            motion.push(foot.place, foot.impulse, self.mass, self.yaw_inertia);
+            motion.push(foot.place, foot.impulse, &self.inertia);
         }
         // The dissipation at last substep's impulses, relative to that at none.
         let mut dissipation = 0.0;
@@ -229,17 +242,13 @@ impl Chassis {
                 if limit <= 0.0 {
                     continue;
                 }
-                let r = foot.place;
-                let (slip, wheel_inverse_mass) = slip_at(k, &motion, r, foot.impulse.x);
-                let a = InverseMass {
-                    xx: 1.0 / self.mass + r.y * r.y / self.yaw_inertia + wheel_inverse_mass,
-                    xy: -r.x * r.y / self.yaw_inertia,
-                    yy: 1.0 / self.mass + r.x * r.x / self.yaw_inertia,
-                };
-                let impulse = friction_impulse(&a, a.apply(foot.impulse) - slip, self.creep / limit, limit);
+                let (slip, wheel_inverse_mass) = slip_at(k, &motion, foot.place, foot.impulse.x);
+                let a = InverseMass { xx: foot.body.xx + wheel_inverse_mass, ..foot.body };
+                let b = a.apply(foot.impulse) - slip;
+                let impulse = friction_impulse(&a, b, self.creep / limit, limit, &mut foot.lambda);
                 let delta = impulse - foot.impulse;
                 foot.impulse = impulse;
-                motion.push(r, delta, self.mass, self.yaw_inertia);
+                motion.push(foot.place, delta, &self.inertia);
                 change = change.max(delta.x.abs().max(delta.y.abs()) / limit);
             }
             if change <= CONVERGED {
@@ -277,6 +286,21 @@ impl Chassis {
     }
 }
 
+/// How hard the body is to move: 1/kg and 1/(kg m^2).
+#[derive(Debug, Clone, Copy)]
+struct Inertia {
+    inverse_mass: f64,
+    inverse_yaw_inertia: f64,
+}
+
+impl Inertia {
+    /// The velocity at a place of the body per impulse there.
+    fn felt_at(&self, r: Vector2<f64>) -> InverseMass {
+        let (m, i) = (self.inverse_mass, self.inverse_yaw_inertia);
+        InverseMass { xx: m + i * r.y * r.y, xy: -i * r.x * r.y, yy: m + i * r.x * r.x }
+    }
+}
+
 /// Motion of the body in its own frame: velocity of the centre of gravity, and yaw rate.
 #[derive(Debug, Clone, Copy)]
 struct Motion {
@@ -291,9 +315,9 @@ impl Motion {
     }
 
     /// Changes the motion by an impulse at a place of the body.
-    fn push(&mut self, place: Vector2<f64>, impulse: Vector2<f64>, mass: f64, yaw_inertia: f64) {
-        self.linear += impulse / mass;
-        self.yaw_rate += cross(place, impulse) / yaw_inertia;
+    fn push(&mut self, place: Vector2<f64>, impulse: Vector2<f64>, inertia: &Inertia) {
+        self.linear += impulse * inertia.inverse_mass;
+        self.yaw_rate += cross(place, impulse) * inertia.inverse_yaw_inertia;
     }
 }
 

@@ -138,8 +138,7 @@ impl Mover {
     }
 
     fn would_crowd(&self, now: &Pose, next: &Pose, walkway: Walkway) -> bool {
-        let gap =
-            |pose: &Pose| distance_to_footprint(&self.footprint, pose.inverse_transform(walkway.robot)) - walkway.radius;
+        let gap = |pose: &Pose| distance_to_footprint(&self.footprint, pose.inverse_transform(walkway.robot)) - walkway.radius;
         let after = gap(next);
         after < CLEARANCE_M && after < gap(now)
     }
