@@ -48,10 +48,10 @@ impl RapierPlant {
         }
     }
 
-    /// The same plant with another longest substep, s, for convergence studies.
+    /// The same plant with another longest substep, s, for convergence studies; held between 1 microsecond and 10 ms.
     #[must_use]
     pub fn with_substep(mut self, substep_s: f64) -> Self {
-        self.substep_s = substep_s;
+        self.substep_s = substep_s.clamp(1e-6, 1e-2);
         self
     }
 
