@@ -5,6 +5,7 @@
 
 mod folder;
 pub mod image;
+pub mod map;
 mod path_plot;
 pub mod run;
 pub mod seeds;

@@ -4,6 +4,8 @@
 //! summed into 4 x 4 cells of 8 directions each (Lowe 2004), upright. The square roots of the normalised sums are stored
 //! (Arandjelovic and Zisserman 2012), which makes the Euclidean distance of descriptors the Hellinger distance of histograms.
 
+use std::f32::consts::SQRT_2;
+
 use super::detect::Feature;
 use super::pyramid::{Image, Pyramid, split_clamped, split_cyclic};
 
@@ -71,25 +73,24 @@ impl Describer {
             (feature.x / octave.step_x, feature.y / octave.step_y),
             (spacing * stretch / octave.step_x, spacing / octave.step_y),
         );
-        let mut sums = [[[0.0_f32; DIRECTIONS]; CELLS]; CELLS];
+        // Rows first: each row of samples counts for the cell rows next to it.
+        let mut by_row = [[[0.0_f32; GRID]; DIRECTIONS]; CELLS];
         for (j, row_weights) in self.weights.iter().enumerate() {
-            let mut row_sums = [[0.0_f32; DIRECTIONS]; CELLS];
-            for (i, weights) in self.weights.iter().enumerate() {
-                let gx = patch[j + 1][i + 2] - patch[j + 1][i];
-                let gy = patch[j + 2][i + 1] - patch[j][i + 1];
-                let (bins, shares) = directions(gx, gy);
-                // Linear interpolation: a sample counts for at most two neighbouring cells.
-                let first = (i.saturating_sub(GRID / CELLS / 2)) / (GRID / CELLS);
-                for c in first..(first + 2).min(CELLS) {
-                    row_sums[c][bins[0]] += weights[c] * shares[0];
-                    row_sums[c][bins[1]] += weights[c] * shares[1];
-                }
-            }
-            for (cells, weight) in sums.iter_mut().zip(row_weights) {
+            let channels = directions(&patch[j], &patch[j + 1], &patch[j + 2]);
+            for (cells, weight) in by_row.iter_mut().zip(row_weights) {
                 if *weight > 0.0 {
-                    for (to, from) in cells.as_flattened_mut().iter_mut().zip(row_sums.as_flattened()) {
+                    for (to, from) in cells.as_flattened_mut().iter_mut().zip(channels.as_flattened()) {
                         *to += weight * from;
                     }
+                }
+            }
+        }
+        // Then columns.
+        let mut sums = [[[0.0_f32; CELLS]; DIRECTIONS]; CELLS];
+        for (to, from) in sums.as_flattened_mut().iter_mut().zip(by_row.as_flattened()) {
+            for (weights, value) in self.weights.iter().zip(from) {
+                for (to, weight) in to.iter_mut().zip(weights) {
+                    *to += weight * value;
                 }
             }
         }
@@ -103,25 +104,36 @@ impl Describer {
     }
 }
 
-/// Splits a gradient between the two of the eight directions that enclose it, such that the two shares as vectors add up to
-/// it. No angle is computed.
-fn directions(gx: f32, gy: f32) -> ([usize; 2], [f32; 2]) {
-    let (ax, ay) = (gx.abs(), gy.abs());
-    let (large, small) = if ax >= ay { (ax, ay) } else { (ay, ax) };
-    let axis = if ax >= ay {
-        if gx >= 0.0 { 0 } else { 4 }
-    } else if gy >= 0.0 {
-        2
-    } else {
-        6
-    };
-    let diagonal = match (gx >= 0.0, gy >= 0.0) {
-        (true, true) => 1,
-        (false, true) => 3,
-        (false, false) => 5,
-        (true, false) => 7,
-    };
-    ([axis, diagonal], [large - small, std::f32::consts::SQRT_2 * small])
+/// Gradients of a row of samples, given with the rows above and below, as shares of the eight directions: each gradient is
+/// split between the two directions that enclose it such that the two shares as vectors add up to it. No angle is computed.
+fn directions(above: &[f32; PATCH], row: &[f32; PATCH], below: &[f32; PATCH]) -> [[f32; GRID]; DIRECTIONS] {
+    let mut channels = [[0.0; GRID]; DIRECTIONS];
+    for i in 0..GRID {
+        let gx = row[i + 2] - row[i];
+        let gy = below[i + 1] - above[i + 1];
+        let (ax, ay) = (gx.abs(), gy.abs());
+        let (east, west) = (0.5 * (ax + gx), 0.5 * (ax - gx));
+        let (south, north) = (0.5 * (ay + gy), 0.5 * (ay - gy));
+        // Along an axis counts what exceeds the other part, on a diagonal the smaller part.
+        channels[0][i] = positive(east - ay);
+        channels[2][i] = positive(south - ax);
+        channels[4][i] = positive(west - ay);
+        channels[6][i] = positive(north - ax);
+        channels[1][i] = SQRT_2 * smaller(east, south);
+        channels[3][i] = SQRT_2 * smaller(west, south);
+        channels[5][i] = SQRT_2 * smaller(west, north);
+        channels[7][i] = SQRT_2 * smaller(east, north);
+    }
+    channels
+}
+
+/// The number, or 0 if it is negative; one instruction, since NaN does not occur here.
+fn positive(a: f32) -> f32 {
+    if a > 0.0 { a } else { 0.0 }
+}
+
+fn smaller(a: f32, b: f32) -> f32 {
+    if a < b { a } else { b }
 }
 
 /// Samples an image on a grid around `centre` with the given steps (x, y), both in pixels of the image.
@@ -147,17 +159,18 @@ mod tests {
     #[test]
     fn shares_add_up_to_the_gradient() {
         for k in 0..64 {
-            let angle = std::f64::consts::TAU * f64::from(k) / 64.0;
-            let (s, c) = crate::geometry::sin_cos(angle);
-            let (bins, shares) = directions(2.0 * c as f32, 2.0 * s as f32);
+            let (s, c) = crate::geometry::sin_cos(std::f64::consts::TAU * f64::from(k) / 64.0);
+            // A plane that rises along (c, s); central differences span two samples.
+            let row = |y: f64| std::array::from_fn(|x| (c * x as f64 + s * y) as f32);
+            let channels = directions(&row(0.0), &row(1.0), &row(2.0));
             let (mut x, mut y) = (0.0, 0.0);
-            for (bin, share) in bins.iter().zip(shares) {
-                let (s, c) = crate::geometry::sin_cos(std::f64::consts::TAU * *bin as f64 / 8.0);
-                assert!(share >= 0.0);
-                x += c * f64::from(share);
-                y += s * f64::from(share);
+            for (bin, channel) in channels.iter().enumerate() {
+                let (s, c) = crate::geometry::sin_cos(std::f64::consts::TAU * bin as f64 / 8.0);
+                assert!(channel.iter().all(|share| *share >= 0.0));
+                x += c * f64::from(channel[7]);
+                y += s * f64::from(channel[7]);
             }
-            assert!((x - 2.0 * c).abs() < 1e-6 && (y - 2.0 * s).abs() < 1e-6, "{angle}");
+            assert!((x - 2.0 * c).abs() < 1e-5 && (y - 2.0 * s).abs() < 1e-5, "{k}: {x} {y}");
         }
     }
 }

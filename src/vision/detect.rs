@@ -113,6 +113,8 @@ impl Scratch {
         let width = row.len();
         self.high.resize(width + 2, 0.0);
         self.low.resize(width + 2, 0.0);
+        // Buffers serve layers of all widths: what a wider one left behind the last column must not be found.
+        self.mask.clear();
         self.mask.resize(width.next_multiple_of(8), 0);
         // Extremes of each column's three pixels, with a copy of the other end on either side.
         let columns = above.iter().zip(row).zip(below);

@@ -32,7 +32,7 @@ pub(super) struct Choice {
 pub(super) struct Gallery {
     /// Home features sorted by height over size, with their index.
     order: Vec<(f32, usize)>,
-    /// Descriptors of feature k in `variants` horizontal stretches, from k * variants on.
+    /// Descriptors of feature k in `variants` horizontal stretches, the first of them 1, from k * variants on.
     descriptors: Vec<Descriptor>,
     variants: usize,
 }
@@ -62,6 +62,8 @@ impl Gallery {
         candidates: &mut Vec<Candidate>,
     ) {
         candidates.clear();
+        let hopeless = (2.5 * limit * DISTANCE_SCALE) as u32;
+        let limit = (limit * DISTANCE_SCALE) as u32;
         for (n, (feature, descriptor)) in now.iter().zip(descriptors).enumerate() {
             let height = height_over_size(feature, horizon);
             let reach = slack.0 + slack.1 * height.abs();
@@ -72,10 +74,17 @@ impl Gallery {
                     continue;
                 }
                 let variants = &self.descriptors[k * self.variants..(k + 1) * self.variants];
-                let best = variants.iter().map(|d| distance(descriptor, d)).min().unwrap_or(u32::MAX);
-                let distance = best as f32 / DISTANCE_SCALE;
-                if distance <= limit {
-                    candidates.push(Candidate { now: n, home: k, distance });
+                let Some((plain, stretched)) = variants.split_first() else { continue };
+                let mut best = distance(descriptor, plain);
+                // Stretching brings what is related nearer, not what is unrelated.
+                if best > hopeless {
+                    continue;
+                }
+                for variant in stretched {
+                    best = best.min(distance(descriptor, variant));
+                }
+                if best <= limit {
+                    candidates.push(Candidate { now: n, home: k, distance: best as f32 / DISTANCE_SCALE });
                 }
             }
         }

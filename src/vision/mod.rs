@@ -46,7 +46,7 @@ pub struct ExtractorSettings {
     pub spread_rad: f64,
     /// Edge of one of the 4 x 4 cells of a descriptor in units of the feature's scale.
     pub cell: f32,
-    /// Horizontal stretches at which home features are described: a wall seen from elsewhere is seen at another slant.
+    /// Horizontal stretches, beside 1, at which home features are described: a wall seen from elsewhere is seen at another slant.
     pub stretches: Vec<f32>,
     /// Tolerance of the agreement in height over size: an absolute and a relative part.
     pub height_slack: (f32, f32),
@@ -76,9 +76,9 @@ impl Default for ExtractorSettings {
             home_features: 600,
             spread_rad: 0.15,
             cell: 2.5,
-            stretches: vec![0.7, 1.0, 1.4],
+            stretches: vec![0.7, 1.4],
             height_slack: (1.0, 0.35),
-            distance: 0.35,
+            distance: 0.15,
             ratio: 0.8,
             guided_ratio: 0.95,
             draws: 300,
@@ -138,11 +138,11 @@ impl Extractor {
         pyramid.build(home, settings.octaves);
         detect::detect(&pyramid, &settings, settings.home_features, &mut scratch, &mut features);
         let projection = home.projection;
-        let stretches = if settings.stretches.is_empty() { &[1.0][..] } else { &settings.stretches };
-        let descriptors = features
-            .iter()
-            .flat_map(|f| stretches.iter().map(|s| describer.describe(&pyramid, f, settings.cell, *s)).collect::<Vec<_>>())
-            .collect();
+        let stretches: Vec<f32> = std::iter::once(1.0).chain(settings.stretches.iter().copied()).collect();
+        let mut descriptors = Vec::with_capacity(features.len() * stretches.len());
+        for feature in &features {
+            descriptors.extend(stretches.iter().map(|s| describer.describe(&pyramid, feature, settings.cell, *s)));
+        }
         let gallery = Gallery::new(&features, descriptors, stretches.len(), horizon(&projection));
         let home_sights = features.iter().map(|f| sight(f, &projection, &settings)).collect();
         Self {
@@ -227,7 +227,7 @@ impl Extractor {
                 settings.distance,
                 settings.guided_ratio,
                 |c| {
-                    let fit = frame.fit(&self.home_sights[c.home], &sights[c.now], false);
+                    let fit = frame.fit(&self.home_sights[c.home], &sights[c.now]);
                     fit.possible && fit.chi2 < CHI2_LIMIT
                 },
             );

@@ -53,10 +53,6 @@ pub(super) struct PlanarMotion {
 pub(super) struct Fit {
     /// Squared residual of (1) over its variance.
     pub chi2: f64,
-    /// sin(phi - a*), signed such that it is positive where the landmark moves as it must.
-    pub parallax: f64,
-    /// |sin(a* - d)|: what the parallax is over the share R / r.
-    pub lever: f64,
     /// Whether sense and reach of the motion and the change of scale are possible.
     pub possible: bool,
 }
@@ -81,34 +77,60 @@ const REACH: f64 = 3.0;
 /// The same squared: the limit of `Fit::chi2`.
 pub(super) const CHI2_LIMIT: f64 = REACH * REACH;
 
+/// The sines and cosines that (1) is made of.
+struct Angles {
+    /// sin(a* - d), cos(a* - d).
+    home: (f64, f64),
+    /// sin(phi - d), cos(phi - d).
+    now: (f64, f64),
+    /// sin(phi - a*).
+    parallax: f64,
+}
+
 impl Frame {
-    /// Fit of a match. With `reverse` the robot went the opposite way.
-    pub fn fit(&self, home: &Sight, now: &Sight, reverse: bool) -> Fit {
+    fn angles(&self, home: &Sight, now: &Sight) -> Angles {
         let phi = Vector2::new(
             self.turn.x * now.unit.x - self.turn.y * now.unit.y,
             self.turn.y * now.unit.x + self.turn.x * now.unit.y,
         );
-        let (a, a_cos) = (cross(self.step, home.unit), self.step.dot(&home.unit));
-        let (b, b_cos) = (cross(self.step, phi), self.step.dot(&phi));
+        Angles {
+            home: (cross(self.step, home.unit), self.step.dot(&home.unit)),
+            now: (cross(self.step, phi), self.step.dot(&phi)),
+            parallax: cross(home.unit, phi),
+        }
+    }
+
+    /// Residual of (1) and its variance.
+    fn residual(angles: &Angles, home: &Sight, now: &Sight) -> (f64, f64) {
+        let ((a, a_cos), (b, b_cos)) = (angles.home, angles.now);
         let error = now.tan * a - home.tan * b;
-        let spread = home.variance * (now.tan * now.tan * a_cos * a_cos + b * b)
+        let variance = home.variance * (now.tan * now.tan * a_cos * a_cos + b * b)
             + now.variance * (home.tan * home.tan * b_cos * b_cos + a * a)
             + 1e-12;
-        let slack = REACH * (home.variance + now.variance).sqrt();
-        let side = if (a < 0.0) == reverse { 1.0 } else { -1.0 };
-        let moved = cross(home.unit, phi) * side;
-        let beyond = b * side;
-        let together = home.unit.dot(&phi);
+        (error, variance)
+    }
+
+    /// How a match fits this motion, and how it fits the opposite step with the same turn: residual and scale are the same,
+    /// the sense is not.
+    fn fit_both(&self, home: &Sight, now: &Sight) -> [Fit; 2] {
+        let angles = self.angles(home, now);
+        let (error, variance) = Self::residual(&angles, home, now);
+        let chi2 = error * error / variance;
+        let (a, b) = (angles.home.0, angles.now.0);
         // r*/r = sin(phi - d) / sin(a* - d), and that is also the ratio of the scales.
         let (near, far) = (now.scale * a.abs(), home.scale * b.abs());
         let scale_fits = near < SCALE_SLACK * far + 0.1 * home.scale && far < SCALE_SLACK * near + 0.1 * now.scale;
-        let _ = together;
-        Fit {
-            chi2: error * error / spread,
-            parallax: moved,
-            lever: a.abs(),
-            possible: moved > -slack && beyond > -slack && scale_fits,
-        }
+        let slack = REACH * (home.variance + now.variance).sqrt();
+        let side = if a < 0.0 { -1.0 } else { 1.0 };
+        [side, -side].map(|side| Fit {
+            chi2,
+            possible: scale_fits && angles.parallax * side > -slack && b * side > -slack,
+        })
+    }
+
+    /// How a match fits this motion.
+    pub fn fit(&self, home: &Sight, now: &Sight) -> Fit {
+        self.fit_both(home, now)[0]
     }
 }
 
@@ -127,9 +149,12 @@ pub(super) fn estimate(pairs: &[Pair], draws: usize, seed: Seed) -> Option<Plana
     }
     let mut stream = seed.stream("vision/motion");
     let mut best: Option<(f64, PlanarMotion)> = None;
-    for k in 0..draws {
+    let mut needed = draws;
+    let mut k = 0;
+    while k < needed {
         // The pool grows from the best matches to all of them (PROSAC).
         let pool = (12 + pairs.len() * 2 * k / draws).min(pairs.len());
+        k += 1;
         let i = (stream.next_u64() % pool as u64) as usize;
         let j = (stream.next_u64() % pool as u64) as usize;
         if i == j {
@@ -139,7 +164,11 @@ pub(super) fn estimate(pairs: &[Pair], draws: usize, seed: Seed) -> Option<Plana
             let (score, motion) = judge(pairs, motion);
             if best.is_none_or(|(s, _)| score > s) {
                 let polished = judge(pairs, polish(pairs, motion));
-                best = Some(if polished.0 > score { polished } else { (score, motion) });
+                let better = if polished.0 > score { polished } else { (score, motion) };
+                // Enough draws for several pairs of right matches, whose noise still varies.
+                let right = better.0 / pairs.len() as f64;
+                needed = ((12.0 / (right * right)) as usize).clamp(20, draws);
+                best = Some(better);
             }
         }
     }
@@ -186,8 +215,7 @@ fn judge(pairs: &[Pair], motion: PlanarMotion) -> (f64, PlanarMotion) {
     let frame = motion.frame();
     let mut support = [0.0; 2];
     for pair in pairs {
-        for (reverse, support) in support.iter_mut().enumerate() {
-            let fit = frame.fit(&pair.home, &pair.now, reverse == 1);
+        for (fit, support) in frame.fit_both(&pair.home, &pair.now).iter().zip(&mut support) {
             if fit.possible && fit.chi2 < CHI2_LIMIT {
                 *support += 1.0 - fit.chi2 / CHI2_LIMIT;
             }
@@ -208,20 +236,13 @@ pub(super) fn polish(pairs: &[Pair], start: PlanarMotion) -> PlanarMotion {
         let (mut dd, mut da, mut aa, mut gd, mut ga) = (0.0, 0.0, 0.0, 0.0, 0.0);
         for pair in pairs {
             let (home, now) = (&pair.home, &pair.now);
-            let fit = frame.fit(home, now, false);
+            let fit = frame.fit(home, now);
             if !fit.possible || fit.chi2 > CHI2_LIMIT {
                 continue;
             }
-            let phi = Vector2::new(
-                frame.turn.x * now.unit.x - frame.turn.y * now.unit.y,
-                frame.turn.y * now.unit.x + frame.turn.x * now.unit.y,
-            );
-            let (a, a_cos) = (cross(frame.step, home.unit), frame.step.dot(&home.unit));
-            let (b, b_cos) = (cross(frame.step, phi), frame.step.dot(&phi));
-            let error = now.tan * a - home.tan * b;
-            let spread = home.variance * (now.tan * now.tan * a_cos * a_cos + b * b)
-                + now.variance * (home.tan * home.tan * b_cos * b_cos + a * a)
-                + 1e-12;
+            let angles = frame.angles(home, now);
+            let (error, spread) = Frame::residual(&angles, home, now);
+            let (a_cos, b_cos) = (angles.home.1, angles.now.1);
             let weight = (1.0 - fit.chi2 / CHI2_LIMIT) / spread;
             let by_direction = home.tan * b_cos - now.tan * a_cos;
             let by_turn = -home.tan * b_cos;

@@ -45,9 +45,11 @@ impl Image {
 
 /// The two columns around `x` and the share of the second; cyclic.
 pub(super) fn split_cyclic(x: f32, width: usize) -> (usize, usize, f32) {
-    let floor = libm::floorf(x);
-    let x0 = (floor as i32).rem_euclid(width as i32) as usize;
-    (x0, if x0 + 1 == width { 0 } else { x0 + 1 }, x - floor)
+    let towards_zero = x as i32;
+    let floor = towards_zero - i32::from(towards_zero as f32 > x);
+    let x0 = usize::try_from(floor).unwrap_or(usize::MAX);
+    let x0 = if x0 < width { x0 } else { floor.rem_euclid(width as i32) as usize };
+    (x0, if x0 + 1 == width { 0 } else { x0 + 1 }, x - floor as f32)
 }
 
 /// The two rows around `y` and the share of the second; clamped.

@@ -1,0 +1,3 @@
+//! stand-in
+/// x
+pub fn world_svg(_w: &crate::world::World) -> String { "<svg/>".into() }
