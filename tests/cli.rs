@@ -48,7 +48,7 @@ fn bad_worlds_are_explained() {
     write("unknown.toml", &lab.replace("[room]", "[room]\nceiling_height = 3"));
     write("walled.toml", &lab.replace("x_m = 3.4", "x_m = 0.0"));
 
-    assert_fails(&run(folder.path(), &["home", "missing.toml"]), 1, &["missing.toml"]);
+    assert_fails(&run(folder.path(), &["home", "missing.toml"]), 2, &["missing.toml"]);
     assert_fails(&run(folder.path(), &["world", "check", "broken.toml"]), 1, &["broken.toml", "1"]);
     assert_fails(&run(folder.path(), &["world", "check", "unknown.toml"]), 1, &["unknown.toml", "ceiling_height"]);
     assert_fails(&run(folder.path(), &["world", "check", "walled.toml"]), 1, &["walled.toml", "home"]);

@@ -92,16 +92,16 @@ pub struct HomeArgs {
     #[arg(long, value_name = "x,y,heading_deg", allow_hyphen_values = true, value_parser = pose)]
     pub initial_estimate: Option<Pose>,
     /// Time limit, s [default: the world's]
-    #[arg(long, value_name = "S", value_parser = positive)]
+    #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = positive)]
     pub time_limit_s: Option<f64>,
     /// Standard deviation of noisy bearings, degrees [default: 0.3]
-    #[arg(long, value_name = "DEG", value_parser = not_negative)]
+    #[arg(long, value_name = "DEG", allow_negative_numbers = true, value_parser = not_negative)]
     pub noise_deg: Option<f64>,
     /// Share of noisy bearings that are missed [default: 0.05]
-    #[arg(long, value_name = "SHARE", value_parser = share)]
+    #[arg(long, value_name = "SHARE", allow_negative_numbers = true, value_parser = share)]
     pub noise_dropout: Option<f64>,
     /// Share of noisy bearings that are false [default: 0.02]
-    #[arg(long, value_name = "SHARE", value_parser = share)]
+    #[arg(long, value_name = "SHARE", allow_negative_numbers = true, value_parser = share)]
     pub noise_false: Option<f64>,
     /// Folder for the results [default: results/runs/home-WORLD-SEED]
     #[arg(long, value_name = "DIR")]
