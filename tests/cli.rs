@@ -1,5 +1,7 @@
 //! The command at its process boundary: what it prints, writes and exits with.
 
+#![allow(clippy::unwrap_used, reason = "helpers of tests are not recognised as tests")]
+
 use std::path::Path;
 use std::process::{Command, Output};
 
@@ -174,7 +176,8 @@ fn a_run_that_does_not_come_home_exits_with_3() {
 fn a_seed_gives_the_same_bytes_on_any_number_of_threads() {
     let folder = tempfile::tempdir().unwrap();
     let files = |sensor: &[&str], threads: &str, out: &str| {
-        let common = ["home", LAB, "--seed", "7", "--time-limit-s", "3", "--renderer", "cpu", "--threads", threads, "--out", out];
+        let common =
+            ["home", LAB, "--seed", "7", "--time-limit-s", "3", "--renderer", "cpu", "--threads", threads, "--out", out];
         let output = run(folder.path(), &[&common, sensor].concat());
         assert!(matches!(output.status.code(), Some(0 | 3)), "{}", stderr(&output));
         let path = folder.path().join(out);
@@ -236,7 +239,9 @@ fn a_panorama_comes_with_its_truth() {
     let tan = (projection["horizon_row"].as_f64().unwrap() - 63.5) * std::f64::consts::TAU / 256.0;
     let expected_mm = 1000.0 * meta["camera_height_m"].as_f64().unwrap() * (1.0 + tan * tan).sqrt() / -tan;
     let floor = meta["instances"].as_array().unwrap().iter().find(|i| i["name"] == "floor").unwrap()["id"].as_u64();
-    for (range, _) in range.rows().last().unwrap().zip(instance.rows().last().unwrap()).filter(|(_, i)| Some(u64::from(i.0[0])) == floor) {
+    for (range, _) in
+        range.rows().next_back().unwrap().zip(instance.rows().next_back().unwrap()).filter(|(_, i)| Some(u64::from(i.0[0])) == floor)
+    {
         assert!((f64::from(range.0[0]) - expected_mm).abs() < 2.0, "{} mm, expected {expected_mm}", range.0[0]);
     }
 }

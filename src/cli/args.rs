@@ -188,9 +188,8 @@ const RENDERERS: &[Choice<RendererChoice>] = &[
 /// Reads one of `choices` by its name.
 fn choice<T: Copy + Send + Sync + 'static>(choices: &'static [Choice<T>]) -> impl TypedValueParser<Value = T> {
     let names = choices.iter().map(|(_, name, help)| PossibleValue::new(*name).help(*help));
-    PossibleValuesParser::new(names).try_map(|given| {
-        choices.iter().find(|(_, name, _)| *name == given).map(|(value, ..)| *value).ok_or("unknown name")
-    })
+    PossibleValuesParser::new(names)
+        .try_map(|given| choices.iter().find(|(_, name, _)| *name == given).map(|(value, ..)| *value).ok_or("unknown name"))
 }
 
 /// A finite number.
