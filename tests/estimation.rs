@@ -20,14 +20,7 @@ fn printed_dynamics(x: &[Dual64; 6], v: f64, omega: f64, home: &[f64; 3]) -> [Du
         let d = r * (theta - phi).cos() - home_range * (Dual64::from(home[i]) - phi).cos();
         -(x[3 + i].sin() * v / d) - omega
     };
-    [
-        (alpha - theta).cos() * v,
-        (alpha - theta).sin() * v / r,
-        Dual64::from(omega),
-        landmark(0),
-        landmark(1),
-        landmark(2),
-    ]
+    [(alpha - theta).cos() * v, (alpha - theta).sin() * v / r, Dual64::from(omega), landmark(0), landmark(1), landmark(2)]
 }
 
 #[test]
@@ -45,7 +38,11 @@ fn paper_dynamics_equal_the_printed_form_and_its_automatic_derivative() {
             for row in 0..6 {
                 assert!((f[row] - printed[row].re).abs() < 1e-9 * scale, "{row}: {} {}", f[row], printed[row].re);
                 let derivative = printed[row].eps;
-                assert!((j[(row, column)] - derivative).abs() < 1e-9 * scale, "{row} {column}: {} {derivative}", j[(row, column)]);
+                assert!(
+                    (j[(row, column)] - derivative).abs() < 1e-9 * scale,
+                    "{row} {column}: {} {derivative}",
+                    j[(row, column)]
+                );
             }
         }
     }

@@ -36,7 +36,9 @@ fn reproject(home: &Panorama, home_pose: Pose, now: &Panorama, pose: Pose, colum
     }
     let expected = (distance * distance + flat * flat * tan * tan).sqrt();
     let near = (-1..=1).flat_map(|dx| (-1..=1).map(move |dy| (dx, dy)));
-    let visible = near.into_iter().any(|(dx, dy)| (at(now, x + f64::from(dx), y + f64::from(dy)) - expected).abs() < 0.02 + 0.02 * expected);
+    let visible = near
+        .into_iter()
+        .any(|(dx, dy)| (at(now, x + f64::from(dx), y + f64::from(dy)) - expected).abs() < 0.02 + 0.02 * expected);
     visible.then_some((x, y))
 }
 
@@ -77,7 +79,13 @@ fn around(home: Pose, distance: f64) -> Vec<Pose> {
         .collect()
 }
 
-fn table(render: impl Fn(Pose) -> Panorama, home_pose: Pose, settings: &ExtractorSettings, distances: &[f64], verbose: bool) -> Vec<(f64, Score)> {
+fn table(
+    render: impl Fn(Pose) -> Panorama,
+    home_pose: Pose,
+    settings: &ExtractorSettings,
+    distances: &[f64],
+    verbose: bool,
+) -> Vec<(f64, Score)> {
     let home = render(home_pose);
     let mut extractor = Extractor::new(settings.clone(), &home);
     let landmarks = extractor.home_snapshot().bearings;
@@ -97,7 +105,10 @@ fn table(render: impl Fn(Pose) -> Panorama, home_pose: Pose, settings: &Extracto
             time += start.elapsed().as_secs_f64();
             let s = score(extractor.matches(), &home, home_pose, &now, pose);
             if verbose {
-                println!("   {:.2} {:.2} {:.2}: {} of {}, {:.2} px", pose.x, pose.y, pose.heading, s.right, s.matches, s.median_px);
+                println!(
+                    "   {:.2} {:.2} {:.2}: {} of {}, {:.2} px",
+                    pose.x, pose.y, pose.heading, s.right, s.matches, s.median_px
+                );
             }
             n += 1;
             sum.matches += s.matches;
@@ -113,10 +124,26 @@ fn table(render: impl Fn(Pose) -> Panorama, home_pose: Pose, settings: &Extracto
             }
         }
         let k = f64::from(hits.max(1));
-        let mean = Score { matches: sum.matches / n, right: sum.right / n, median_px: sum.median_px / k, p95_px: sum.p95_px / k, median_z: sum.median_z / k, p95_z: sum.p95_z / k };
+        let mean = Score {
+            matches: sum.matches / n,
+            right: sum.right / n,
+            median_px: sum.median_px / k,
+            p95_px: sum.p95_px / k,
+            median_z: sum.median_z / k,
+            p95_z: sum.p95_z / k,
+        };
         println!(
             "{distance:5.2} m: {:4} right of {:4} ({:3.0} %, worst {:3.0} %, least {low}) of {} | bearing error px median {:.2} 95 % {:.2} | z {:.2} {:.2} | {:.1} ms",
-            mean.right, mean.matches, 100.0 * sum.right as f64 / sum.matches.max(1) as f64, 100.0 * worst, landmarks.len(), mean.median_px, mean.p95_px, mean.median_z, mean.p95_z, 1000.0 * time / n as f64
+            mean.right,
+            mean.matches,
+            100.0 * sum.right as f64 / sum.matches.max(1) as f64,
+            100.0 * worst,
+            landmarks.len(),
+            mean.median_px,
+            mean.p95_px,
+            mean.median_z,
+            mean.p95_z,
+            1000.0 * time / n as f64
         );
         rows.push((distance, mean));
     }
@@ -128,7 +155,9 @@ fn simple_room(pose: Pose) -> Panorama {
     let projection = Projection { horizon_row: 108.0, ..Projection::new(1440, 180) };
     let mut out = Panorama::black(projection);
     let hash = |a: i64, b: i64, c: i64| {
-        let mut h = (a as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ (b as u64).wrapping_mul(0xC2B2_AE3D_27D4_EB4F) ^ (c as u64).wrapping_mul(0x1656_67B1_9E37_79F9);
+        let mut h = (a as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15)
+            ^ (b as u64).wrapping_mul(0xC2B2_AE3D_27D4_EB4F)
+            ^ (c as u64).wrapping_mul(0x1656_67B1_9E37_79F9);
         h ^= h >> 29;
         h = h.wrapping_mul(0xBF58_476D_1CE4_E5B9);
         h ^= h >> 32;
@@ -147,7 +176,8 @@ fn simple_room(pose: Pose) -> Panorama {
         let tx = if d.x > 0.0 { (7.0 - pose.x) / d.x } else { -pose.x / d.x };
         let ty = if d.y > 0.0 { (6.0 - pose.y) / d.y } else { -pose.y / d.y };
         let flat = tx.min(ty);
-        let (wall, u) = if tx < ty { (i64::from(d.x > 0.0), pose.y + d.y * flat) } else { (2 + i64::from(d.y > 0.0), pose.x + d.x * flat) };
+        let (wall, u) =
+            if tx < ty { (i64::from(d.x > 0.0), pose.y + d.y * flat) } else { (2 + i64::from(d.y > 0.0), pose.x + d.x * flat) };
         for row in 0..180_usize {
             let tan = projection.tan_elevation(row as f64);
             let z = 0.4 + flat * tan;

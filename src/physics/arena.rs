@@ -80,11 +80,8 @@ impl Arena {
         }
         let centre_of_gravity = Vector::new(robot_spec.centre_of_gravity_m as f32, 0.0);
         let mass = MassProperties::new(centre_of_gravity, robot_spec.mass_kg as f32, yaw_inertia as f32);
-        let body = RigidBodyBuilder::dynamic()
-            .pose(rapier_pose(&start))
-            .additional_mass_properties(mass)
-            .can_sleep(false)
-            .build();
+        let body =
+            RigidBodyBuilder::dynamic().pose(rapier_pose(&start)).additional_mass_properties(mass).can_sleep(false).build();
         let (robot, hull) = physics.insert(body, hard(ColliderBuilder::ball(robot_spec.radius_m as f32)));
         Self { physics, robot, hull, movers, touching: Vec::new() }
     }

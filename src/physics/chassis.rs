@@ -11,16 +11,16 @@
 
 use super::contact::{InverseMass, friction_impulse};
 use super::motor::{WheelDrive, WheelSpec, WheelState, flushed};
-use crate::geometry::{Pose, Vector2, sin_cos};
+use crate::geometry::{Pose, Vector2, cross, sin_cos};
 use crate::world::RobotSpec;
 
 /// Gravity that presses the wheels on the floor, m/s^2.
 pub const STANDARD_GRAVITY_M_S2: f64 = 9.81;
 
 /// Gauss-Seidel sweeps at most. Ordinary driving takes three to five.
-const MAX_SWEEPS: usize = 30;
+const MAX_SWEEPS: usize = 50;
 /// A sweep that changes no impulse by more than this share of its friction limit is the last.
-const CONVERGED: f64 = 1e-10;
+const CONVERGED: f64 = 1e-9;
 
 /// Velocity of the centre of gravity in the room's frame, m/s, and yaw rate, rad/s.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -32,7 +32,7 @@ pub struct PlanarVelocity {
 }
 
 /// A contact with the floor: the left wheel, the right wheel, the caster.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 struct Foot {
     /// Place from the centre of gravity in the body's frame, m.
     place: Vector2<f64>,
@@ -42,6 +42,10 @@ struct Foot {
     friction_share: f64,
     /// Friction impulse of the last substep in the body's frame, N s: where the next search starts.
     impulse: Vector2<f64>,
+    /// The friction solver's multiplier at that impulse, 1/kg.
+    lambda: f64,
+    /// The body's inverse mass as felt here, 1/kg.
+    body: InverseMass,
 }
 
 /// The robot: rigid body, wheels, motors and their contacts with the floor.
@@ -49,6 +53,7 @@ struct Foot {
 pub struct Chassis {
     mass: f64,
     yaw_inertia: f64,
+    inertia: Inertia,
     cog_ahead: f64,
     creep: f64,
     feet: [Foot; 3],
@@ -72,17 +77,25 @@ impl Chassis {
         let cog = robot.centre_of_gravity_m;
         let weight = robot.mass_kg * STANDARD_GRAVITY_M_S2;
         let caster_share = if robot.caster_m == 0.0 { 0.0 } else { (cog / robot.caster_m).clamp(0.0, 1.0) };
-        let foot = |x: f64, y: f64, share: f64, friction_share: f64| Foot {
-            place: Vector2::new(x - cog, y),
-            load: weight * share,
-            friction_share,
-            impulse: Vector2::zeros(),
+        let yaw_inertia = robot.yaw_inertia_kg_m2.unwrap_or(0.5 * robot.mass_kg * robot.radius_m * robot.radius_m);
+        let inertia = Inertia { inverse_mass: 1.0 / robot.mass_kg, inverse_yaw_inertia: 1.0 / yaw_inertia };
+        let foot = |x: f64, y: f64, share: f64, friction_share: f64| {
+            let place = Vector2::new(x - cog, y);
+            Foot {
+                place,
+                load: weight * share,
+                friction_share,
+                impulse: Vector2::zeros(),
+                lambda: 0.0,
+                body: inertia.felt_at(place),
+            }
         };
         let wheel_share = 0.5 * (1.0 - caster_share);
         let half_track = 0.5 * robot.track_m;
         Self {
             mass: robot.mass_kg,
-            yaw_inertia: robot.yaw_inertia_kg_m2.unwrap_or(0.5 * robot.mass_kg * robot.radius_m * robot.radius_m),
+            yaw_inertia,
+            inertia,
             cog_ahead: cog,
             creep: robot.creep_m_s,
             feet: [
@@ -122,7 +135,7 @@ impl Chassis {
     /// Forward and leftward speed of the middle of the axle, m/s.
     #[must_use]
     pub fn axle_velocity(&self) -> Vector2<f64> {
-        let v = into_body(self.velocity.linear, self.heading);
+        let v = turned_back(self.velocity.linear, sin_cos(self.heading));
         Vector2::new(v.x, v.y - self.velocity.yaw_rate * self.cog_ahead)
     }
 
@@ -187,11 +200,20 @@ impl Chassis {
         let to_room = |v: Vector2<f64>| Vector2::new(cos * v.x - sin * v.y, sin * v.x + cos * v.y);
         let ahead = self.position + self.velocity.linear * dt;
 
-        let start = {
-            let v = self.velocity.linear;
-            (Vector2::new(cos * v.x + sin * v.y, cos * v.y - sin * v.x), self.velocity.yaw_rate)
+        let respond = |k: usize, along: f64| {
+            let wheel = &self.wheels[k];
+            let r = wheel.respond(&self.wheel_states[k], drives[k], along * wheel.radius_m, dt);
+            (r.speed * wheel.radius_m, r.inverse_inertia * wheel.radius_m * wheel.radius_m)
         };
-        let (mut linear, mut yaw_rate) = start;
+        // Slip at contact k of a body that moves so, under the impulse `along` the wheel; and the wheel's inverse mass there.
+        let slip_at = |k: usize, motion: &Motion, place: Vector2<f64>, along: f64| {
+            let over_ground = motion.at(place);
+            let (rolling, inverse_mass) = if k < 2 { respond(k, along) } else { (0.0, 0.0) };
+            (Vector2::new(over_ground.x - rolling, over_ground.y), inverse_mass)
+        };
+
+        let free = Motion { linear: turned_back(self.velocity.linear, (sin, cos)), yaw_rate: self.velocity.yaw_rate };
+        let mut motion = free;
         let mut limits = [0.0; 3];
         for (foot, limit) in self.feet.iter_mut().zip(&mut limits) {
             let mu = friction(ahead + to_room(foot.place)) * foot.friction_share;
@@ -200,39 +222,33 @@ impl Chassis {
             if length > *limit {
                 foot.impulse *= *limit / length;
             }
-            linear += foot.impulse / self.mass;
-            yaw_rate += crate::geometry::cross(foot.place, foot.impulse) / self.yaw_inertia;
+            motion.push(foot.place, foot.impulse, &self.inertia);
+        }
+        // The dissipation at last substep's impulses, relative to that at none.
+        let mut dissipation = 0.0;
+        for (k, (foot, &limit)) in self.feet.iter().zip(&limits).enumerate().filter(|(_, (_, limit))| **limit > 0.0) {
+            let without = slip_at(k, &free, foot.place, 0.0).0;
+            let with = slip_at(k, &motion, foot.place, foot.impulse.x).0 + foot.impulse * (self.creep / limit);
+            dissipation += foot.impulse.dot(&(without + with));
+        }
+        if dissipation > 0.0 {
+            motion = free;
+            self.feet.iter_mut().for_each(|foot| foot.impulse = Vector2::zeros());
         }
 
-        let respond = |k: usize, along: f64| {
-            let wheel = &self.wheels[k];
-            let r = wheel.respond(&self.wheel_states[k], drives[k], along * wheel.radius_m, dt);
-            (r.speed, wheel.radius_m, r.inverse_inertia * wheel.radius_m * wheel.radius_m)
-        };
         for _ in 0..MAX_SWEEPS {
             let mut change: f64 = 0.0;
             for (k, (foot, &limit)) in self.feet.iter_mut().zip(&limits).enumerate() {
                 if limit <= 0.0 {
                     continue;
                 }
-                let r = foot.place;
-                let mut slip = Vector2::new(linear.x - yaw_rate * r.y, linear.y + yaw_rate * r.x);
-                let mut a = InverseMass {
-                    xx: 1.0 / self.mass + r.y * r.y / self.yaw_inertia,
-                    xy: -r.x * r.y / self.yaw_inertia,
-                    yy: 1.0 / self.mass + r.x * r.x / self.yaw_inertia,
-                };
-                if k < 2 {
-                    let (speed, radius, inverse_mass) = respond(k, foot.impulse.x);
-                    slip.x -= speed * radius;
-                    a.xx += inverse_mass;
-                }
+                let (slip, wheel_inverse_mass) = slip_at(k, &motion, foot.place, foot.impulse.x);
+                let a = InverseMass { xx: foot.body.xx + wheel_inverse_mass, ..foot.body };
                 let b = a.apply(foot.impulse) - slip;
-                let impulse = friction_impulse(&a, b, self.creep / limit, limit);
+                let impulse = friction_impulse(&a, b, self.creep / limit, limit, &mut foot.lambda);
                 let delta = impulse - foot.impulse;
                 foot.impulse = impulse;
-                linear += delta / self.mass;
-                yaw_rate += crate::geometry::cross(r, delta) / self.yaw_inertia;
+                motion.push(foot.place, delta, &self.inertia);
                 change = change.max(delta.x.abs().max(delta.y.abs()) / limit);
             }
             if change <= CONVERGED {
@@ -240,19 +256,17 @@ impl Chassis {
             }
         }
 
-        let speeds: [f64; 2] = std::array::from_fn(|k| respond(k, self.feet[k].impulse.x).0);
+        let rolling: [f64; 2] = std::array::from_fn(|k| respond(k, self.feet[k].impulse.x).0);
         for k in 0..2 {
-            self.wheels[k].finish(&mut self.wheel_states[k], drives[k], speeds[k], dt);
-            let r = self.feet[k].place;
-            let rolling = self.wheel_states[k].speed * self.wheels[k].radius_m;
-            self.slip[k] =
-                Vector2::new(flushed(linear.x - yaw_rate * r.y - rolling), flushed(linear.y + yaw_rate * r.x));
+            let over_ground = motion.at(self.feet[k].place);
+            self.slip[k] = Vector2::new(over_ground.x - rolling[k], over_ground.y).map(flushed);
+            self.wheels[k].finish(&mut self.wheel_states[k], drives[k], rolling[k] / self.wheels[k].radius_m, dt);
         }
         for foot in &mut self.feet {
             foot.impulse = foot.impulse.map(flushed);
         }
         self.velocity_before = self.velocity;
-        self.velocity = PlanarVelocity { linear: to_room(linear.map(flushed)), yaw_rate: flushed(yaw_rate) };
+        self.velocity = PlanarVelocity { linear: to_room(motion.linear.map(flushed)), yaw_rate: flushed(motion.yaw_rate) };
     }
 
     /// Moves for `dt` seconds with the mean of the velocities before and after the last kick.
@@ -272,7 +286,42 @@ impl Chassis {
     }
 }
 
-fn into_body(v: Vector2<f64>, heading: f64) -> Vector2<f64> {
-    let (s, c) = sin_cos(heading);
-    Vector2::new(c * v.x + s * v.y, c * v.y - s * v.x)
+/// How hard the body is to move: 1/kg and 1/(kg m^2).
+#[derive(Debug, Clone, Copy)]
+struct Inertia {
+    inverse_mass: f64,
+    inverse_yaw_inertia: f64,
+}
+
+impl Inertia {
+    /// The velocity at a place of the body per impulse there.
+    fn felt_at(&self, r: Vector2<f64>) -> InverseMass {
+        let (m, i) = (self.inverse_mass, self.inverse_yaw_inertia);
+        InverseMass { xx: m + i * r.y * r.y, xy: -i * r.x * r.y, yy: m + i * r.x * r.x }
+    }
+}
+
+/// Motion of the body in its own frame: velocity of the centre of gravity, and yaw rate.
+#[derive(Debug, Clone, Copy)]
+struct Motion {
+    linear: Vector2<f64>,
+    yaw_rate: f64,
+}
+
+impl Motion {
+    /// Velocity at a place of the body.
+    fn at(&self, place: Vector2<f64>) -> Vector2<f64> {
+        Vector2::new(self.linear.x - self.yaw_rate * place.y, self.linear.y + self.yaw_rate * place.x)
+    }
+
+    /// Changes the motion by an impulse at a place of the body.
+    fn push(&mut self, place: Vector2<f64>, impulse: Vector2<f64>, inertia: &Inertia) {
+        self.linear += impulse * inertia.inverse_mass;
+        self.yaw_rate += cross(place, impulse) * inertia.inverse_yaw_inertia;
+    }
+}
+
+/// A vector of the room in a frame whose heading has this sine and cosine.
+fn turned_back(v: Vector2<f64>, (sin, cos): (f64, f64)) -> Vector2<f64> {
+    Vector2::new(cos * v.x + sin * v.y, cos * v.y - sin * v.x)
 }

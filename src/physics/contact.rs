@@ -33,30 +33,32 @@ impl InverseMass {
     }
 }
 
-/// Newton steps on the multiplier of the disc; it converges from the left without overshoot, in three or four steps.
+/// Newton steps at most; from the last substep's multiplier one or two do, from none three or four.
 const NEWTON_STEPS: usize = 12;
 
 /// The friction impulse, N s, of a contact with inverse mass `a`, compliance `gamma` (1/kg) and `limit` = mu N dt (N s).
 ///
 /// On the rim this is the secular equation |(A + (gamma + lambda) I)^-1 b| = limit in lambda >= 0, solved by Newton's method
-/// on 1/limit - 1/|j| (Hebden; Moré and Sorensen 1983, "Computing a trust region step").
-pub(super) fn friction_impulse(a: &InverseMass, b: Vector2<f64>, gamma: f64, limit: f64) -> Vector2<f64> {
-    let mut shift = gamma;
-    let mut j = a.solve(shift, b);
-    let mut length = j.norm();
-    if length <= limit {
-        return j;
+/// on 1/limit - 1/|j| (Hebden; Moré and Sorensen 1983, "Computing a trust region step"). That function is convex, so a step
+/// from anywhere lands left of the root, and from there on the steps approach it without overshoot. `lambda` is where the
+/// search starts, from the last substep, and comes back as the solution.
+pub(super) fn friction_impulse(a: &InverseMass, b: Vector2<f64>, gamma: f64, limit: f64, lambda: &mut f64) -> Vector2<f64> {
+    let inside = a.solve(gamma, b);
+    if inside.norm_squared() <= limit * limit {
+        *lambda = 0.0;
+        return inside;
     }
     for _ in 0..NEWTON_STEPS {
-        let step = (length - limit) / limit * (length * length) / j.dot(&a.solve(shift, j));
-        shift += step;
-        j = a.solve(shift, b);
-        length = j.norm();
-        if length - limit <= 1e-13 * limit {
+        let j = a.solve(gamma + *lambda, b);
+        let length = j.norm();
+        if (length - limit).abs() <= 1e-12 * limit {
             break;
         }
+        let slope = j.dot(&a.solve(gamma + *lambda, j));
+        *lambda = (*lambda + (length - limit) * length * length / (limit * slope)).max(0.0);
     }
-    j * (limit / length)
+    let j = a.solve(gamma + *lambda, b);
+    j * (limit / j.norm())
 }
 
 #[cfg(test)]
@@ -69,9 +71,10 @@ mod tests {
     fn impulse_creeps_inside_the_disc_and_opposes_the_slip_on_its_rim() {
         let a = InverseMass { xx: 4.2, xy: -0.03, yy: 0.5 };
         let (gamma, limit) = (1.5, 6e-3);
+        let mut lambda = 0.0; // passed on from one direction to the next, as from one substep to the next
         for k in 0..40 {
             let b = direction(f64::from(k) * 0.37) * (1e-3 * f64::from(k));
-            let j = friction_impulse(&a, b, gamma, limit);
+            let j = friction_impulse(&a, b, gamma, limit, &mut lambda);
             let slip = a.apply(j) - b; // slip after the impulse
             if j.norm() < limit * (1.0 - 1e-9) {
                 assert!((slip + j * gamma).norm() < 1e-15);

@@ -109,8 +109,8 @@ impl WheelSpec {
     }
 }
 
-/// Zero for what no longer matters (1e-15 of whatever unit): decaying velocities come to true rest instead of lingering
-/// among denormal numbers, which are slow to compute with.
+/// Zero for what no longer matters (1e-13 of whatever unit, far below what the friction solver resolves): decaying velocities
+/// come to true rest instead of lingering among denormal numbers, which are slow to compute with.
 pub(super) fn flushed(value: f64) -> f64 {
-    if value.abs() < 1e-15 { 0.0 } else { value }
+    if value.abs() < 1e-13 { 0.0 } else { value }
 }

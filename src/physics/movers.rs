@@ -2,7 +2,7 @@
 //!
 //! Moving bodies are driven, not pushed, so one that walked on regardless would crush the robot against a wall. Like a
 //! person, a mover therefore stops short of the robot: it waits while its next move would bring it closer than
-//! [`CLEARANCE_M`]. A walker that has waited for [`PATIENCE_S`] turns to another point; a path mover waits until the way is
+//! [`CLEARANCE_M`]. A walker that has waited for [`PATIENCE_S`] tries other points until one is free; a path mover waits until the way is
 //! free. The robot may still drive into a mover, which then stands like a wall. Bodies high enough for the robot to pass
 //! below take no notice of it. Movers keep the heading that the file gives them, and pass through other bodies.
 
@@ -128,11 +128,8 @@ impl Mover {
         let next = Pose { x: here.x, y: here.y, ..*pose };
         if self.solid && self.would_crowd(pose, &next, walkway) {
             self.waited_s += dt;
-            if self.waited_s > PATIENCE_S {
-                self.waited_s = 0.0;
-                if let Route::Walk { .. } = self.route {
-                    self.route.choose_next(pose.position());
-                }
+            if self.waited_s > PATIENCE_S && matches!(self.route, Route::Walk { .. }) {
+                self.route.choose_next(pose.position());
             }
         } else {
             self.waited_s = 0.0;
@@ -141,8 +138,7 @@ impl Mover {
     }
 
     fn would_crowd(&self, now: &Pose, next: &Pose, walkway: Walkway) -> bool {
-        let gap =
-            |pose: &Pose| distance_to_footprint(&self.footprint, pose.inverse_transform(walkway.robot)) - walkway.radius;
+        let gap = |pose: &Pose| distance_to_footprint(&self.footprint, pose.inverse_transform(walkway.robot)) - walkway.radius;
         let after = gap(next);
         after < CLEARANCE_M && after < gap(now)
     }

@@ -52,6 +52,6 @@ mod tests {
         assert!(!contains(&l, Vector2::new(1.5, 1.5)) && !contains(&l, Vector2::new(-0.1, 1.0)));
         let outside = Vector2::new(2.0, 1.75);
         assert!((distance_to_footprint(&Footprint::Polygon(l.to_vec()), outside) - 0.75).abs() < 1e-15);
-        assert!(segments_cross(l[1], l[5], l[0], l[3]) && !segments_cross(l[0], l[1], l[1], l[2]));
+        assert!(segments_cross(l[1], l[5], l[0], Vector2::new(3.0, 3.0)) && !segments_cross(l[0], l[1], l[1], l[2]));
     }
 }

@@ -48,10 +48,10 @@ impl RapierPlant {
         }
     }
 
-    /// The same plant with another longest substep, s, for convergence studies.
+    /// The same plant with another longest substep, s, for convergence studies; held between 1 microsecond and 10 ms.
     #[must_use]
     pub fn with_substep(mut self, substep_s: f64) -> Self {
-        self.substep_s = substep_s;
+        self.substep_s = substep_s.clamp(1e-6, 1e-2);
         self
     }
 
@@ -64,10 +64,7 @@ impl RapierPlant {
     /// Adds to the robot's velocity at once, as a push from outside does. The wheels learn of it through the floor.
     pub fn push(&mut self, change: PlanarVelocity) {
         let v = self.chassis.velocity();
-        self.chassis.set_velocity(PlanarVelocity {
-            linear: v.linear + change.linear,
-            yaw_rate: v.yaw_rate + change.yaw_rate,
-        });
+        self.chassis.set_velocity(PlanarVelocity { linear: v.linear + change.linear, yaw_rate: v.yaw_rate + change.yaw_rate });
     }
 }
 

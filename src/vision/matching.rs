@@ -136,7 +136,11 @@ pub(super) fn choose(
         .collect();
     // Each home feature once, the nearest first.
     choices.sort_by(|a, b| {
-        a.candidate.home.cmp(&b.candidate.home).then(a.candidate.distance.total_cmp(&b.candidate.distance)).then(a.candidate.now.cmp(&b.candidate.now))
+        a.candidate
+            .home
+            .cmp(&b.candidate.home)
+            .then(a.candidate.distance.total_cmp(&b.candidate.distance))
+            .then(a.candidate.now.cmp(&b.candidate.now))
     });
     choices.dedup_by_key(|c| c.candidate.home);
     choices.sort_by(|a, b| a.ratio.total_cmp(&b.ratio).then(a.candidate.home.cmp(&b.candidate.home)));

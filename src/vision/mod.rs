@@ -220,17 +220,10 @@ impl Extractor {
         let mut chosen = Vec::new();
         for _ in 0..2 {
             let frame = motion.frame();
-            chosen = matching::choose(
-                &self.candidates,
-                &self.home,
-                &self.now,
-                settings.distance,
-                settings.guided_ratio,
-                |c| {
-                    let fit = frame.fit(&self.home_sights[c.home], &sights[c.now]);
-                    fit.possible && fit.chi2 < CHI2_LIMIT
-                },
-            );
+            chosen = matching::choose(&self.candidates, &self.home, &self.now, settings.distance, settings.guided_ratio, |c| {
+                let fit = frame.fit(&self.home_sights[c.home], &sights[c.now]);
+                fit.possible && fit.chi2 < CHI2_LIMIT
+            });
             let pairs: Vec<Pair> = chosen.iter().map(pair).collect();
             motion = motion::polish(&pairs, motion);
         }

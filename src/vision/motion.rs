@@ -122,10 +122,7 @@ impl Frame {
         let scale_fits = near < SCALE_SLACK * far + 0.1 * home.scale && far < SCALE_SLACK * near + 0.1 * now.scale;
         let slack = REACH * (home.variance + now.variance).sqrt();
         let side = if a < 0.0 { -1.0 } else { 1.0 };
-        [side, -side].map(|side| Fit {
-            chi2,
-            possible: scale_fits && angles.parallax * side > -slack && b * side > -slack,
-        })
+        [side, -side].map(|side| Fit { chi2, possible: scale_fits && angles.parallax * side > -slack && b * side > -slack })
     }
 
     /// How a match fits this motion.

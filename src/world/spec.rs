@@ -345,7 +345,7 @@ impl Default for RobotSpec {
             speed_gain: 0.4,
             speed_integral_gain: 4.0,
             encoder_counts_per_turn: 508.8,
-            wheel_radius_error: [0.003, -0.002],
+            wheel_radius_error: [0.0015, -0.0005],
             max_speed_m_s: 0.306,
             max_turn_rate_rad_s: 1.9,
             max_acceleration_m_s2: 0.9,

@@ -373,8 +373,16 @@ impl AnchoredFilter {
         let mut refused: Vec<(usize, LandmarkId)> = Vec::new();
         for round in 1..=SMOOTHER_ROUNDS {
             let index: BTreeMap<LandmarkId, usize> = ids.iter().enumerate().map(|(k, id)| (*id, k)).collect();
-            let priors: Vec<Prior> =
-                ids.iter().map(|id| self.settings.prior(&self.home[id], self.settings.inverse_range_mean)).collect();
+            // The ranges of one room are alike: together their priors may say no more about the scale than one of them does.
+            // Scale is for odometry to tell.
+            let priors: Vec<Prior> = ids
+                .iter()
+                .map(|id| {
+                    let mut prior = self.settings.prior(&self.home[id], self.settings.inverse_range_mean);
+                    prior.variance[1] *= ids.len() as f64;
+                    prior
+                })
+                .collect();
             let frames: Vec<Frame> = self
                 .history
                 .iter()
