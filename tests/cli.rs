@@ -1,5 +1,7 @@
 //! The command at its process boundary: what it prints, writes and exits with.
 
+#![allow(clippy::unwrap_used, reason = "helpers of tests are not recognised as tests")]
+
 use std::path::Path;
 use std::process::{Command, Output};
 
@@ -238,7 +240,7 @@ fn a_panorama_comes_with_its_truth() {
     let expected_mm = 1000.0 * meta["camera_height_m"].as_f64().unwrap() * (1.0 + tan * tan).sqrt() / -tan;
     let floor = meta["instances"].as_array().unwrap().iter().find(|i| i["name"] == "floor").unwrap()["id"].as_u64();
     for (range, _) in
-        range.rows().last().unwrap().zip(instance.rows().last().unwrap()).filter(|(_, i)| Some(u64::from(i.0[0])) == floor)
+        range.rows().next_back().unwrap().zip(instance.rows().next_back().unwrap()).filter(|(_, i)| Some(u64::from(i.0[0])) == floor)
     {
         assert!((f64::from(range.0[0]) - expected_mm).abs() < 2.0, "{} mm, expected {expected_mm}", range.0[0]);
     }

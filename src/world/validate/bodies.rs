@@ -4,7 +4,7 @@ use super::room::{polygon_inside, texture};
 use super::{Faults, GREATEST_M, TOLERANCE_M};
 use crate::geometry::Vector2;
 use crate::world::convex::{Convex, gap_to_walls_m};
-use crate::world::polygon::{anticlockwise, contains, contains_within};
+use crate::world::polygon::{anticlockwise, contains, contains_within, edges};
 use crate::world::spec::{BodySpec, ShapeSpec};
 use crate::world::{Body, Footprint, MotionSpec, World, WorldSpec};
 
@@ -88,8 +88,7 @@ fn check_body(place: &str, body: &BodySpec, spec: &WorldSpec, faults: &mut Fault
             faults.positive(format!("{place}.motion.path.speed_m_s"), *speed_m_s, 10.0);
         }
         Some(MotionSpec::Walk { region_m, speed_m_s }) => {
-            // Convex, because a walker goes straight from point to point and has to stay inside.
-            faults.polygon(&format!("{place}.motion.walk.region_m"), region_m, true);
+            faults.polygon(&format!("{place}.motion.walk.region_m"), region_m, false);
             faults.positive(format!("{place}.motion.walk.speed_m_s"), *speed_m_s, 10.0);
         }
     }
@@ -132,20 +131,19 @@ fn at_same_height(a: &Body, b: &Body) -> bool {
 }
 
 fn check_motion(world: &World, body: &Body, place: &str, faults: &mut Faults) {
-    // A body may turn as it walks: what it sweeps is bounded by a disc around its position.
+    // Whichever way it walks, what it sweeps is bounded by that of a disc around its position.
     let reach_m = match &body.footprint {
         Footprint::Disc(radius_m) => *radius_m,
         Footprint::Polygon(corners) => corners.iter().map(|c| c.dot(c).sqrt()).fold(0.0, f64::max),
     };
-    let in_the_way = |swept: &Convex| {
-        if gap_to_walls_m(&world.outline, swept) < -TOLERANCE_M {
+    let standing: Vec<_> = world.bodies.iter().filter(|b| b.motion.is_none() && at_same_height(b, body)).collect();
+    let in_the_way = |a, b| {
+        let swept = Convex::corridor(a, b, reach_m);
+        if gap_to_walls_m(&world.outline, &swept) < -TOLERANCE_M {
             return Some("a wall".to_owned());
         }
-        let standing = world.bodies.iter().filter(|b| b.motion.is_none() && at_same_height(b, body));
-        standing
-            .map(|b| (b, Convex::of_body(b, &b.pose)))
-            .find(|(_, shape)| swept.gap_m(shape) < -TOLERANCE_M)
-            .map(|(b, _)| format!("\"{}\"", b.name))
+        let hit = standing.iter().find(|b| swept.gap_m(&Convex::of_body(b, &b.pose)) < -TOLERANCE_M);
+        hit.map(|b| format!("\"{}\"", b.name))
     };
     match &body.motion {
         None => {}
@@ -158,7 +156,7 @@ fn check_motion(world: &World, body: &Body, place: &str, faults: &mut Faults) {
                 let way = if k < corners_m.len() { "to" } else { "from" };
                 if (next - at).norm() < LEAST_LEG_M {
                     faults.add(&place, format!("a leg {way} this corner of no length"), "corners at least 1 cm apart");
-                } else if let Some(what) = in_the_way(&Convex::corridor(at, next, reach_m)) {
+                } else if let Some(what) = in_the_way(at, next) {
                     let allowed = format!("legs that keep {reach_m:.3} m, the body's reach, from walls and standing bodies");
                     faults.add(&place, format!("a leg {way} this corner that runs into {what}"), allowed);
                 }
@@ -175,7 +173,11 @@ fn check_motion(world: &World, body: &Body, place: &str, faults: &mut Faults) {
             if !contains_within(&region, body.pose.position(), TOLERANCE_M) {
                 let [x, y] = [body.pose.x, body.pose.y];
                 faults.add(&place, format!("a region without the body's own position [{x}, {y}]"), "a region around it");
-            } else if let Some(what) = in_the_way(&Convex::polygon(&region, reach_m)) {
+                return;
+            }
+            // What lies in the way of walks inside lies in the region or within reach of its edge.
+            let enclosed = standing.iter().find(|b| contains(&region, b.pose.position())).map(|b| format!("\"{}\"", b.name));
+            if let Some(what) = enclosed.or_else(|| edges(&region).find_map(|(a, b)| in_the_way(a, b))) {
                 let allowed = format!("a region that keeps {reach_m:.3} m, the body's reach, from walls and standing bodies");
                 faults.add(&place, format!("a region too close to {what}"), allowed);
             }
