@@ -19,7 +19,7 @@ const STEERING_GAIN: f64 = 4.0;
 /// The paper's beta.
 const BETA: f64 = 1.5;
 /// Deceleration planned for the last stretch, as a share of the drive's own.
-const BRAKING_SHARE: f64 = 0.5;
+const BRAKING_SHARE: f64 = 0.8;
 
 /// A steering law with the limits of robot and task.
 #[derive(Debug, Clone, Copy)]
@@ -66,7 +66,7 @@ impl Controller {
         let facing = libm::cos(error.clamp(-std::f64::consts::FRAC_PI_2, std::f64::consts::FRAC_PI_2));
         // The relay turns only while it moves: it needs a little speed even when it faces away.
         let least = if self.law == Law::Lyapunov { 0.1 } else { 0.0 };
-        let v = cruise.min(braking) * (facing * facing).max(least);
+        let v = cruise.min(braking) * facing.max(least);
         Twist { v, omega: self.steer(pose, v) }
     }
 

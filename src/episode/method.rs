@@ -67,7 +67,7 @@ pub fn build(kind: MethodKind, law: LawKind, briefing: Briefing, initial: Option
 }
 
 /// Home counts as reached within this share of the arrival radius, by the estimate.
-const STOP_SHARE: f64 = 0.4;
+const STOP_SHARE: f64 = 0.25;
 /// ... if the position's standard deviation is within this share of the arrival radius.
 const STOP_SD_SHARE: f64 = 0.4;
 /// Creeping speed while the estimate is home but not yet sure, m/s.

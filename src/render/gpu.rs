@@ -10,9 +10,11 @@ use super::{Renderer, RendererInfo, Scene, View};
 use crate::error::{Error, Result};
 use crate::panorama::Panorama;
 
-/// The compute shader: `shaders/columns.wgsl`, `shaders/shade.wgsl` and `shaders/panorama.wgsl`, one after the other.
+/// The compute shader: `shaders/columns.wgsl`, `sample.wgsl`, `shade.wgsl` and `panorama.wgsl`, one after the other.
 pub const SHADER: &str = concat!(
     include_str!("../../shaders/columns.wgsl"),
+    "\n",
+    include_str!("../../shaders/sample.wgsl"),
     "\n",
     include_str!("../../shaders/shade.wgsl"),
     "\n",

@@ -7,6 +7,8 @@ mod columns;
 mod cpu;
 mod frame;
 mod gpu;
+mod hits;
+mod sample;
 mod scene;
 mod shade;
 mod texture;

@@ -1,7 +1,9 @@
 //! Worlds: rooms with landmarks, obstacles, floor, robot, camera and home, loaded from a file and checked as a whole.
 //!
 //! [`WorldSpec`] is the file as written, [`World`] the checked form: absolute corners, radians, instance ids. Loading reports
-//! every fault of a file at once; see [`WorldFault`].
+//! every fault of a file at once; see [`WorldFault`]. It goes through three gates: the text becomes a tree that knows its
+//! lines (`document`), the tree is compared with the schema (`structure`), and the spec's values and places are checked
+//! (`validate`). A [`World`] also tells where a robot may stand and start (`free`).
 
 pub mod convex;
 mod document;

@@ -138,7 +138,8 @@ impl Wish {
                 places.extend([at(cx, cy, 0.0), upright].into_iter().filter(fits));
                 places.extend([at(cx, above, 4.0), at(cx, below, 7.0), at(right, cy, 9.0), at(left, cy, 11.0)]);
                 for (y, malus) in [(above, 14.0), (below, 18.0)] {
-                    places.extend([at(x1 + 0.3 * width, y, malus), at(x0 - 0.3 * width, y, malus + 2.0)]);
+                    // Flush with the left or right side.
+                    places.extend([at(x0 + 0.5 * width, y, malus), at(x1 - 0.5 * width, y, malus + 2.0)]);
                 }
                 // One line farther out, for crowded places.
                 places.extend([at(cx, above - LINE_PX, 25.0), at(cx, below + LINE_PX, 28.0)]);
