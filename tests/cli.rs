@@ -123,6 +123,27 @@ fn no_adapter_is_no_panic() {
     }
 }
 
+#[cfg(unix)]
+#[test]
+fn ctrl_c_ends_in_good_order() {
+    let folder = tempfile::tempdir().unwrap();
+    let arguments = ["home", LAB, "--bearings", "noisy", "--seeds", "1..90000", "--out", "batch"];
+    let mut child = wayhome(folder.path(), &arguments).stderr(std::process::Stdio::piped()).spawn().unwrap();
+    // The folder is opened once the handler is in place.
+    let marker = folder.path().join("batch/.wayhome");
+    let deadline = std::time::Instant::now() + std::time::Duration::from_secs(20);
+    while !marker.exists() {
+        assert!(std::time::Instant::now() < deadline, "the batch does not start");
+        std::thread::sleep(std::time::Duration::from_millis(10));
+    }
+    let killed = Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+    assert!(killed.success());
+    let status = child.wait().unwrap();
+    assert_eq!(status.code(), Some(130));
+    let held: Vec<_> = std::fs::read_dir(folder.path().join("batch")).unwrap().map(|e| e.unwrap().file_name()).collect();
+    assert_eq!(held, [".wayhome"], "nothing half done is left");
+}
+
 /// The summary of a finished run without what may differ from run to run.
 fn summary(folder: &Path) -> Value {
     let text = std::fs::read_to_string(folder.join("summary.json")).unwrap();
@@ -239,8 +260,12 @@ fn a_panorama_comes_with_its_truth() {
     let tan = (projection["horizon_row"].as_f64().unwrap() - 63.5) * std::f64::consts::TAU / 256.0;
     let expected_mm = 1000.0 * meta["camera_height_m"].as_f64().unwrap() * (1.0 + tan * tan).sqrt() / -tan;
     let floor = meta["instances"].as_array().unwrap().iter().find(|i| i["name"] == "floor").unwrap()["id"].as_u64();
-    for (range, _) in
-        range.rows().next_back().unwrap().zip(instance.rows().next_back().unwrap()).filter(|(_, i)| Some(u64::from(i.0[0])) == floor)
+    for (range, _) in range
+        .rows()
+        .next_back()
+        .unwrap()
+        .zip(instance.rows().next_back().unwrap())
+        .filter(|(_, i)| Some(u64::from(i.0[0])) == floor)
     {
         assert!((f64::from(range.0[0]) - expected_mm).abs() < 2.0, "{} mm, expected {expected_mm}", range.0[0]);
     }

@@ -18,6 +18,9 @@ const EXIT_CODES: &str = "Exit codes:
   3    a single run of `home` ended without reaching home
   130  interrupted by Ctrl-C; nothing half written is left behind";
 
+/// Heading of the flags that all subcommands have.
+const GENERAL: &str = "General options";
+
 /// Headless, physics-simulated robot testbed for bearing-only visual homing
 #[derive(Debug, Parser)]
 #[command(version, after_help = EXIT_CODES)]
@@ -32,13 +35,13 @@ pub struct Args {
 #[derive(Debug, clap::Args)]
 pub struct CommonArgs {
     /// Print one JSON object on stdout
-    #[arg(long, global = true)]
+    #[arg(long, global = true, help_heading = GENERAL)]
     pub json: bool,
     /// No progress and no diagnostics on stderr, errors excepted
-    #[arg(long, short, global = true)]
+    #[arg(long, short, global = true, help_heading = GENERAL)]
     pub quiet: bool,
     /// Worker threads [default: one a processor]; no result depends on their number
-    #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    #[arg(long, global = true, help_heading = GENERAL, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub threads: Option<u16>,
 }
 
