@@ -41,51 +41,66 @@ pub(super) fn detect(
     spread(features, width, settings.spread_rad as f32 / std::f32::consts::TAU * width, limit);
 }
 
-/// A layer's difference image and its size relative to the panorama.
-fn layer_of(pyramid: &Pyramid, layer: usize) -> (&Image, f32, f32) {
-    let octave = &pyramid.octaves[layer / 2];
-    (&octave.difference[layer % 2], octave.step_x, octave.step_y)
+/// A layer next to the one that is scanned, addressed in the pixels of that one.
+struct Neighbour<'a> {
+    image: &'a Image,
+    ratio_x: f32,
+    ratio_y: f32,
+}
+
+impl<'a> Neighbour<'a> {
+    fn new(pyramid: &'a Pyramid, layer: usize, scanned: usize) -> Self {
+        let (own, other) = (&pyramid.octaves[scanned / 2], &pyramid.octaves[layer / 2]);
+        Self {
+            image: &other.difference[layer % 2],
+            ratio_x: own.step_x / other.step_x,
+            ratio_y: own.step_y / other.step_y,
+        }
+    }
+
+    fn sample(&self, x: f32, y: f32) -> f32 {
+        self.image.sample(x * self.ratio_x, y * self.ratio_y)
+    }
+
+    /// Whether `value`, at pixel (x, y) of the scanned layer, lies further from 0 than this layer at and beside that place.
+    fn topped_by(&self, value: f32, x: usize, y: usize) -> bool {
+        let sign = value.signum();
+        let (x, y) = (x as f32, y as f32);
+        let cross = [(0.0, 0.0), (-1.0, 0.0), (1.0, 0.0), (0.0, -1.0), (0.0, 1.0)];
+        cross.iter().all(|(dx, dy)| sign * self.sample(x + dx, y + dy) < sign * value)
+    }
 }
 
 fn scan(pyramid: &Pyramid, layer: usize, settings: &ExtractorSettings, scratch: &mut Scratch, features: &mut Vec<Feature>) {
-    let (image, step_x, step_y) = layer_of(pyramid, layer);
+    let octave = &pyramid.octaves[layer / 2];
+    let image = &octave.difference[layer % 2];
     let (width, height) = (image.width, image.height);
+    let coarser = Neighbour::new(pyramid, layer + 1, layer);
+    // The finest layer has none below it: what is smallest there may be smaller still, and is taken as it is.
+    let finer = (layer > 0).then(|| Neighbour::new(pyramid, layer - 1, layer));
     for y in 1..height - 1 {
         let rows = [image.row(y - 1), image.row(y), image.row(y + 1)];
         scratch.find(rows, settings.contrast);
         for &x in &scratch.found {
             let (left, right) = (if x == 0 { width - 1 } else { x - 1 }, if x + 1 == width { 0 } else { x + 1 });
             let patch = rows.map(|row| [row[left], row[x], row[right]]);
+            let Some((dx, dy, peak)) = refine(&patch, settings.edge_ratio) else { continue };
             let value = patch[1][1];
-            let sign = value.signum();
-            let (xf, yf) = (x as f32, y as f32);
-            let other = |layer: usize, x: f32, y: f32| {
-                let (image, sx, sy) = layer_of(pyramid, layer);
-                sign * image.sample(x * step_x / sx, y * step_y / sy)
-            };
-            let tops = |layer: usize| {
-                [(0.0, 0.0), (-1.0, 0.0), (1.0, 0.0), (0.0, -1.0), (0.0, 1.0)]
-                    .iter()
-                    .all(|&(dx, dy)| other(layer, xf + dx, yf + dy) < sign * value)
-            };
-            // The finest layer has none below it: what is smallest there may be smaller still, and is taken as it is.
-            if !tops(layer + 1) || (layer > 0 && !tops(layer - 1)) {
+            if !coarser.topped_by(value, x, y) || finer.as_ref().is_some_and(|f| !f.topped_by(value, x, y)) {
                 continue;
             }
-            let Some((dx, dy, peak)) = refine(&patch, settings.edge_ratio) else { continue };
-            let (xr, yr) = (xf + dx, yf + dy);
-            let shift = if layer == 0 {
-                0.0
-            } else {
-                let (low, high) = (other(layer - 1, xr, yr), other(layer + 1, xr, yr));
-                let bend = low + high - 2.0 * sign * peak;
-                if bend < 0.0 { (0.5 * (low - high) / bend).clamp(-0.5, 0.5) } else { 0.0 }
-            };
+            let (xr, yr) = (x as f32 + dx, y as f32 + dy);
+            let shift = finer.as_ref().map_or(0.0, |finer| {
+                let (low, high) = (finer.sample(xr, yr), coarser.sample(xr, yr));
+                let bend = low + high - 2.0 * peak;
+                // The bend has the sign opposite to the peak's.
+                if bend * peak < 0.0 { (0.5 * (low - high) / bend).clamp(-0.5, 0.5) } else { 0.0 }
+            });
             // Mean of the two images' standard deviations: a layer's two Gaussians are sqrt 2 apart.
             let sigma = BASE_SIGMA * 1.189_207_1 * libm::exp2f(0.5 * (layer as f32 + shift));
             features.push(Feature {
-                x: xr.rem_euclid(width as f32) * step_x,
-                y: yr * step_y,
+                x: xr.rem_euclid(width as f32) * octave.step_x,
+                y: yr * octave.step_y,
                 sigma,
                 octave: layer / 2,
                 level: layer % 2,
@@ -171,15 +186,22 @@ fn refine(p: &[[f32; 3]; 3], edge_ratio: f32) -> Option<(f32, f32, f32)> {
     Some((dx, dy, p[1][1] + 0.5 * (gx * dx + gy * dy)))
 }
 
-/// Keeps `limit` features. Each is ranked by how many stronger ones of its octave lie within `reach` columns, and the best
+/// How many times the features wanted compete for a place: the strongest of the whole picture.
+const PRESELECTION: usize = 3;
+
+/// Keeps `limit` features. Each of the strongest is ranked by how many stronger ones of its octave lie within `reach` columns, and the best
 /// ranked stay: rich corners of the room do not crowd out the poor ones, and no sector border makes a turn of the robot
 /// change the choice.
 fn spread(features: &mut Vec<Feature>, width: f32, reach: f32, limit: usize) {
     let by_strength = |a: &Feature, b: &Feature| b.response.abs().total_cmp(&a.response.abs());
     let by_place = |a: &Feature, b: &Feature| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)).then(a.sigma.total_cmp(&b.sigma));
+    if features.len() > PRESELECTION * limit {
+        let order = |a: &Feature, b: &Feature| by_strength(a, b).then_with(|| by_place(a, b));
+        features.select_nth_unstable_by(PRESELECTION * limit, order);
+        features.truncate(PRESELECTION * limit);
+    }
     if features.len() > limit {
-        // The stable sort keeps the order of equals, which is that of the picture.
-        features.sort_by(|a, b| a.octave.cmp(&b.octave).then(a.x.total_cmp(&b.x)));
+        features.sort_by(|a, b| a.octave.cmp(&b.octave).then_with(|| by_place(a, b)));
         let mut ranked = Vec::with_capacity(features.len());
         let (mut places, mut strengths) = (Vec::new(), Vec::new());
         for class in features.chunk_by(|a, b| a.octave == b.octave) {

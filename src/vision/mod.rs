@@ -50,9 +50,9 @@ pub struct ExtractorSettings {
     pub stretches: Vec<f32>,
     /// Tolerance of the agreement in height over size: an absolute and a relative part.
     pub height_slack: (f32, f32),
-    /// Largest squared descriptor distance of a match, as a share of that of unrelated descriptors.
+    /// Largest descriptor distance of a match, as a share of that of unrelated descriptors.
     pub distance: f32,
-    /// Largest ratio of a match's squared descriptor distance to the runner-up's, before the motion is known.
+    /// Largest ratio of a match's descriptor distance to the runner-up's, before the motion is known.
     pub ratio: f32,
     /// The same among those candidates that fit the motion.
     pub guided_ratio: f32,
@@ -62,6 +62,8 @@ pub struct ExtractorSettings {
     pub sd_px: f64,
     /// Standard deviation of a feature's position: a part in proportion to its scale (pixels a pixel).
     pub sd_per_scale: f64,
+    /// What the geometric check allows a feature's position in addition, pixels (standard deviation).
+    pub slack_px: f64,
     /// Seed of the draws.
     pub seed: u64,
 }
@@ -78,12 +80,13 @@ impl Default for ExtractorSettings {
             cell: 2.5,
             stretches: vec![0.7, 1.4],
             height_slack: (1.0, 0.35),
-            distance: 0.15,
-            ratio: 0.8,
+            distance: 0.37,
+            ratio: 0.9,
             guided_ratio: 0.95,
             draws: 300,
-            sd_px: 0.25,
-            sd_per_scale: 0.2,
+            sd_px: 0.05,
+            sd_per_scale: 0.1,
+            slack_px: 0.15,
             seed: 0,
         }
     }
@@ -102,7 +105,7 @@ pub struct Match {
     pub home_scale_px: f64,
     /// Scale in the current panorama, pixels.
     pub now_scale_px: f64,
-    /// Squared descriptor distance, 0 (equal) to 1 (nothing in common).
+    /// Descriptor distance, 0 (equal) to about 1 (unrelated).
     pub distance: f64,
     /// Standard deviation of the bearing in the home panorama, rad.
     pub home_sd_rad: f64,
@@ -138,12 +141,9 @@ impl Extractor {
         pyramid.build(home, settings.octaves);
         detect::detect(&pyramid, &settings, settings.home_features, &mut scratch, &mut features);
         let projection = home.projection;
-        let stretches: Vec<f32> = std::iter::once(1.0).chain(settings.stretches.iter().copied()).collect();
-        let mut descriptors = Vec::with_capacity(features.len() * stretches.len());
-        for feature in &features {
-            descriptors.extend(stretches.iter().map(|s| describer.describe(&pyramid, feature, settings.cell, *s)));
-        }
-        let gallery = Gallery::new(&features, descriptors, stretches.len(), horizon(&projection));
+        let gallery = Gallery::new(&features, &settings.stretches, horizon(&projection), |feature, stretch| {
+            describer.describe(&pyramid, feature, settings.cell, stretch)
+        });
         let home_sights = features.iter().map(|f| sight(f, &projection, &settings)).collect();
         Self {
             settings,
@@ -202,12 +202,11 @@ impl Extractor {
         self.descriptors.clear();
         self.descriptors.extend(self.now.iter().map(|f| self.describer.describe(&self.pyramid, f, settings.cell, 1.0)));
         self.gallery.compare(
-            &self.home,
             &self.now,
             &self.descriptors,
             horizon(&projection),
             settings.height_slack,
-            1.5 * settings.distance,
+            1.15 * settings.distance,
             &mut self.candidates,
         );
         let sights: Vec<Sight> = self.now.iter().map(|f| sight(f, &projection, settings)).collect();
@@ -263,11 +262,12 @@ fn sd_rad(feature: &Feature, projection: &Projection, settings: &ExtractorSettin
 
 fn sight(feature: &Feature, projection: &Projection, settings: &ExtractorSettings) -> Sight {
     let sd = sd_rad(feature, projection, settings);
+    let slack = settings.slack_px * projection.pixel_rad();
     let unit: Vector2<f64> = direction(projection.azimuth(f64::from(feature.x)));
     Sight {
         unit,
         tan: projection.tan_elevation(f64::from(feature.y)),
-        variance: sd * sd,
+        variance: sd * sd + slack * slack,
         scale: f64::from(feature.sigma) * projection.pixel_rad(),
     }
 }
