@@ -135,7 +135,8 @@ fn smaller(a: f32, b: f32) -> f32 {
 /// Samples an image on a grid around `centre` with the given steps (x, y), both in pixels of the image.
 fn cut(image: &Image, centre: (f32, f32), step: (f32, f32)) -> [[f32; PATCH]; PATCH] {
     let offset = |k: usize| k as f32 - 0.5 * (PATCH - 1) as f32;
-    let columns: [(usize, usize, f32); PATCH] = std::array::from_fn(|k| split_cyclic(centre.0 + step.0 * offset(k), image.width));
+    let columns: [(usize, usize, f32); PATCH] =
+        std::array::from_fn(|k| split_cyclic(centre.0 + step.0 * offset(k), image.width));
     std::array::from_fn(|j| {
         let (y0, y1, fy) = split_clamped(centre.1 + step.1 * offset(j), image.height);
         let (a, b) = (image.row(y0), image.row(y1));

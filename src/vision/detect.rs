@@ -4,7 +4,6 @@
 //! (Lowe 2004, on the half-octave pyramid). The robot turns about the vertical only, so features have no orientation: up is
 //! up in every picture.
 
-use super::ExtractorSettings;
 use super::pyramid::{BASE_SIGMA, Image, Pyramid};
 
 /// A feature of a panorama.
@@ -24,21 +23,15 @@ pub(super) struct Feature {
 }
 
 /// Finds the features of a pyramid and keeps the strongest, spread over azimuth and scale, in an order that depends on the
-/// picture only.
-pub(super) fn detect(
-    pyramid: &Pyramid,
-    settings: &ExtractorSettings,
-    limit: usize,
-    scratch: &mut Scratch,
-    features: &mut Vec<Feature>,
-) {
+/// picture only. Returns the strength below which no feature had a chance to be kept.
+pub(super) fn detect(pyramid: &Pyramid, criteria: &Criteria, scratch: &mut Scratch, features: &mut Vec<Feature>) -> f32 {
     features.clear();
     let layers = 2 * pyramid.octaves.len();
     for layer in 0..layers - 1 {
-        scan(pyramid, layer, settings, scratch, features);
+        scan(pyramid, layer, criteria, scratch, features);
     }
     let width = pyramid.octaves[0].gauss[0].width as f32;
-    spread(features, width, settings.spread_rad as f32 / std::f32::consts::TAU * width, limit);
+    spread(features, width, criteria.spread_rad as f32 / std::f32::consts::TAU * width, criteria.limit)
 }
 
 /// A layer next to the one that is scanned, addressed in the pixels of that one.
@@ -51,27 +44,46 @@ struct Neighbour<'a> {
 impl<'a> Neighbour<'a> {
     fn new(pyramid: &'a Pyramid, layer: usize, scanned: usize) -> Self {
         let (own, other) = (&pyramid.octaves[scanned / 2], &pyramid.octaves[layer / 2]);
-        Self {
-            image: &other.difference[layer % 2],
-            ratio_x: own.step_x / other.step_x,
-            ratio_y: own.step_y / other.step_y,
-        }
+        Self { image: &other.difference[layer % 2], ratio_x: own.step_x / other.step_x, ratio_y: own.step_y / other.step_y }
     }
 
     fn sample(&self, x: f32, y: f32) -> f32 {
         self.image.sample(x * self.ratio_x, y * self.ratio_y)
     }
 
-    /// Whether `value`, at pixel (x, y) of the scanned layer, lies further from 0 than this layer at and beside that place.
-    fn topped_by(&self, value: f32, x: usize, y: usize) -> bool {
+    /// Whether `value`, at row `y` and the middle one of three columns, lies further from 0 than this layer at and beside
+    /// that place.
+    fn topped_by(&self, value: f32, [left, x, right]: [usize; 3], y: usize) -> bool {
         let sign = value.signum();
+        let least = sign * value;
+        if self.ratio_x == 1.0 {
+            let row = self.image.row(y);
+            return sign * row[x] < least
+                && sign * row[left] < least
+                && sign * row[right] < least
+                && sign * self.image.row(y - 1)[x] < least
+                && sign * self.image.row(y + 1)[x] < least;
+        }
         let (x, y) = (x as f32, y as f32);
         let cross = [(0.0, 0.0), (-1.0, 0.0), (1.0, 0.0), (0.0, -1.0), (0.0, 1.0)];
-        cross.iter().all(|(dx, dy)| sign * self.sample(x + dx, y + dy) < sign * value)
+        cross.iter().all(|(dx, dy)| sign * self.sample(x + dx, y + dy) < least)
     }
 }
 
-fn scan(pyramid: &Pyramid, layer: usize, settings: &ExtractorSettings, scratch: &mut Scratch, features: &mut Vec<Feature>) {
+/// What counts as a feature.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Criteria {
+    /// Least strength, grey levels.
+    pub contrast: f32,
+    /// Largest ratio of curvatures.
+    pub edge_ratio: f32,
+    /// Features are ranked among those within this azimuth on either side, rad.
+    pub spread_rad: f64,
+    /// Most features.
+    pub limit: usize,
+}
+
+fn scan(pyramid: &Pyramid, layer: usize, criteria: &Criteria, scratch: &mut Scratch, features: &mut Vec<Feature>) {
     let octave = &pyramid.octaves[layer / 2];
     let image = &octave.difference[layer % 2];
     let (width, height) = (image.width, image.height);
@@ -80,13 +92,14 @@ fn scan(pyramid: &Pyramid, layer: usize, settings: &ExtractorSettings, scratch: 
     let finer = (layer > 0).then(|| Neighbour::new(pyramid, layer - 1, layer));
     for y in 1..height - 1 {
         let rows = [image.row(y - 1), image.row(y), image.row(y + 1)];
-        scratch.find(rows, settings.contrast);
+        scratch.find(rows, criteria.contrast);
         for &x in &scratch.found {
             let (left, right) = (if x == 0 { width - 1 } else { x - 1 }, if x + 1 == width { 0 } else { x + 1 });
             let patch = rows.map(|row| [row[left], row[x], row[right]]);
-            let Some((dx, dy, peak)) = refine(&patch, settings.edge_ratio) else { continue };
+            let Some((dx, dy, peak)) = refine(&patch, criteria.edge_ratio) else { continue };
             let value = patch[1][1];
-            if !coarser.topped_by(value, x, y) || finer.as_ref().is_some_and(|f| !f.topped_by(value, x, y)) {
+            let columns = [left, x, right];
+            if !coarser.topped_by(value, columns, y) || finer.as_ref().is_some_and(|f| !f.topped_by(value, columns, y)) {
                 continue;
             }
             let (xr, yr) = (x as f32 + dx, y as f32 + dy);
@@ -192,12 +205,14 @@ const PRESELECTION: usize = 3;
 /// Keeps `limit` features. Each of the strongest is ranked by how many stronger ones of its octave lie within `reach` columns, and the best
 /// ranked stay: rich corners of the room do not crowd out the poor ones, and no sector border makes a turn of the robot
 /// change the choice.
-fn spread(features: &mut Vec<Feature>, width: f32, reach: f32, limit: usize) {
+fn spread(features: &mut Vec<Feature>, width: f32, reach: f32, limit: usize) -> f32 {
+    let mut least = 0.0;
     let by_strength = |a: &Feature, b: &Feature| b.response.abs().total_cmp(&a.response.abs());
     let by_place = |a: &Feature, b: &Feature| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)).then(a.sigma.total_cmp(&b.sigma));
     if features.len() > PRESELECTION * limit {
         let order = |a: &Feature, b: &Feature| by_strength(a, b).then_with(|| by_place(a, b));
         features.select_nth_unstable_by(PRESELECTION * limit, order);
+        least = features[PRESELECTION * limit].response.abs();
         features.truncate(PRESELECTION * limit);
     }
     if features.len() > limit {
@@ -231,4 +246,5 @@ fn spread(features: &mut Vec<Feature>, width: f32, reach: f32, limit: usize) {
         features.extend(ranked.into_iter().map(|(_, feature)| feature));
     }
     features.sort_by(by_place);
+    least
 }

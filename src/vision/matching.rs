@@ -4,7 +4,7 @@
 //! the landmark's height over its size, wherever it is seen from. Only features that agree in this number are compared at
 //! all, which saves most of the work and many wrong matches.
 
-use super::describe::{UNRELATED, Descriptor, distance};
+use super::describe::{Descriptor, UNRELATED, distance};
 use super::detect::Feature;
 
 /// Two features that may be the same landmark.
@@ -154,7 +154,11 @@ pub(super) fn choose(
         .collect();
     // Each home feature once, the nearest first.
     choices.sort_by(|a, b| {
-        a.candidate.home.cmp(&b.candidate.home).then(a.candidate.distance.total_cmp(&b.candidate.distance)).then(a.candidate.now.cmp(&b.candidate.now))
+        a.candidate
+            .home
+            .cmp(&b.candidate.home)
+            .then(a.candidate.distance.total_cmp(&b.candidate.distance))
+            .then(a.candidate.now.cmp(&b.candidate.now))
     });
     choices.dedup_by_key(|c| c.candidate.home);
     choices.sort_by(|a, b| a.ratio.total_cmp(&b.ratio).then(a.candidate.home.cmp(&b.candidate.home)));

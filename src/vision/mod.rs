@@ -23,7 +23,7 @@ use crate::panorama::{Panorama, Projection};
 use crate::random::Seed;
 
 use describe::{Describer, Descriptor};
-use detect::{Feature, Scratch};
+use detect::{Criteria, Feature, Scratch};
 use matching::{Candidate, Choice, Gallery};
 use motion::{CHI2_LIMIT, Pair, Sight};
 use pyramid::Pyramid;
@@ -58,6 +58,8 @@ pub struct ExtractorSettings {
     pub guided_ratio: f32,
     /// Pairs of matches tried as the motion.
     pub draws: usize,
+    /// Fewest matches that make an observation: where fewer fit one motion, they do by chance and none is reported.
+    pub least_matches: usize,
     /// Standard deviation of a feature's position: a constant part, pixels.
     pub sd_px: f64,
     /// Standard deviation of a feature's position: a part in proportion to its scale (pixels a pixel).
@@ -84,6 +86,7 @@ impl Default for ExtractorSettings {
             ratio: 0.9,
             guided_ratio: 0.95,
             draws: 300,
+            least_matches: 16,
             sd_px: 0.05,
             sd_per_scale: 0.1,
             slack_px: 0.15,
@@ -117,6 +120,7 @@ pub struct Match {
 /// the same bearings.
 pub struct Extractor {
     settings: ExtractorSettings,
+    criteria: Criteria,
     describer: Describer,
     pyramid: Pyramid,
     scratch: Scratch,
@@ -139,7 +143,16 @@ impl Extractor {
         let mut scratch = Scratch::default();
         let mut features = Vec::new();
         pyramid.build(home, settings.octaves);
-        detect::detect(&pyramid, &settings, settings.home_features, &mut scratch, &mut features);
+        let mut criteria = Criteria {
+            contrast: settings.contrast,
+            edge_ratio: settings.edge_ratio,
+            spread_rad: settings.spread_rad,
+            limit: settings.home_features,
+        };
+        let hopeless = detect::detect(&pyramid, &criteria, &mut scratch, &mut features);
+        // Later panoramas show much the same surfaces: what is far too weak here need not be looked at there.
+        criteria.contrast = criteria.contrast.max(0.5 * hopeless);
+        criteria.limit = settings.features;
         let projection = home.projection;
         let gallery = Gallery::new(&features, &settings.stretches, horizon(&projection), |feature, stretch| {
             describer.describe(&pyramid, feature, settings.cell, stretch)
@@ -147,6 +160,7 @@ impl Extractor {
         let home_sights = features.iter().map(|f| sight(f, &projection, &settings)).collect();
         Self {
             settings,
+            criteria,
             describer,
             pyramid,
             scratch,
@@ -198,7 +212,7 @@ impl Extractor {
         let projection = now.projection;
         self.matches.clear();
         self.pyramid.build(now, settings.octaves);
-        detect::detect(&self.pyramid, settings, settings.features, &mut self.scratch, &mut self.now);
+        detect::detect(&self.pyramid, &self.criteria, &mut self.scratch, &mut self.now);
         self.descriptors.clear();
         self.descriptors.extend(self.now.iter().map(|f| self.describer.describe(&self.pyramid, f, settings.cell, 1.0)));
         self.gallery.compare(
@@ -219,19 +233,15 @@ impl Extractor {
         let mut chosen = Vec::new();
         for _ in 0..2 {
             let frame = motion.frame();
-            chosen = matching::choose(
-                &self.candidates,
-                &self.home,
-                &self.now,
-                settings.distance,
-                settings.guided_ratio,
-                |c| {
-                    let fit = frame.fit(&self.home_sights[c.home], &sights[c.now]);
-                    fit.possible && fit.chi2 < CHI2_LIMIT
-                },
-            );
+            chosen = matching::choose(&self.candidates, &self.home, &self.now, settings.distance, settings.guided_ratio, |c| {
+                let fit = frame.fit(&self.home_sights[c.home], &sights[c.now]);
+                fit.possible && fit.chi2 < CHI2_LIMIT
+            });
             let pairs: Vec<Pair> = chosen.iter().map(pair).collect();
             motion = motion::polish(&pairs, motion);
+        }
+        if chosen.len() < settings.least_matches {
+            return;
         }
         chosen.sort_by_key(|c| c.candidate.home);
         for choice in &chosen {
