@@ -3,11 +3,12 @@
 #![allow(clippy::print_stdout, reason = "a failing floor is easier to understand beside the whole table")]
 
 use std::path::Path;
+use std::sync::LazyLock;
 
 use wayhome::geometry::{Pose, angle_of, direction, wrap};
 use wayhome::observation::Bearing;
 use wayhome::panorama::Panorama;
-use wayhome::render::{self, Renderer, RendererChoice, Scene, View};
+use wayhome::render::{self, RendererChoice, Scene, View};
 use wayhome::vision::{Extractor, ExtractorSettings, Match};
 use wayhome::world::World;
 
@@ -15,23 +16,26 @@ use wayhome::world::World;
 struct Studio {
     world: World,
     scene: Scene,
-    renderer: Box<dyn Renderer>,
 }
 
+/// The laboratory; its textures are drawn once for all tests.
+static LAB: LazyLock<Studio> = LazyLock::new(|| {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("worlds/lab.toml");
+    Studio::new(World::load(&path).expect("the lab loads"))
+});
+
 impl Studio {
-    fn lab() -> Self {
-        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("worlds/lab.toml");
-        let world = World::load(&path).expect("the lab loads");
-        let scene = Scene::new(&world).expect("the lab can be rendered");
-        let renderer = render::create(RendererChoice::Cpu).expect("there is a processor");
-        Self { world, scene, renderer }
+    fn new(world: World) -> Self {
+        let scene = Scene::new(&world).expect("the world can be rendered");
+        Self { world, scene }
     }
 
-    fn take(&mut self, robot: Pose) -> Panorama {
+    fn take(&self, robot: Pose) -> Panorama {
         let projection = self.world.projection();
         let bodies = self.world.body_poses();
         let mut panorama = Panorama::black(projection);
-        self.renderer.render(&self.scene, &View { projection, robot, bodies: &bodies }, &mut panorama).expect("it renders");
+        let mut renderer = render::create(RendererChoice::Cpu).expect("there is a processor");
+        renderer.render(&self.scene, &View { projection, robot, bodies: &bodies }, &mut panorama).expect("it renders");
         panorama
     }
 
@@ -130,9 +134,8 @@ fn azimuth_of(bearings: &[Bearing], wanted: Bearing) -> Option<f64> {
 /// Counts, precision and bearing errors at growing distance from home.
 #[test]
 fn landmarks_are_found_again_metres_away() {
-    let mut studio = Studio::lab();
-    let home_pose = studio.world.home;
-    let home = studio.take(home_pose);
+    let home_pose = LAB.world.home;
+    let home = LAB.take(home_pose);
     let mut extractor = Extractor::new(ExtractorSettings::default(), &home);
     println!("landmarks: {}", extractor.home_snapshot().bearings.len());
     // Distance, least right matches in any panorama, precision, median bearing error in degrees.
@@ -141,7 +144,7 @@ fn landmarks_are_found_again_metres_away() {
     {
         let mut score = Score::default();
         for pose in around(home_pose, distance_m).filter(Studio::is_free) {
-            let now = studio.take(pose);
+            let now = LAB.take(pose);
             extractor.observe(&now);
             score.add(extractor.matches(), &home, home_pose, &now, pose);
         }
@@ -166,13 +169,12 @@ fn landmarks_are_found_again_metres_away() {
 /// At home, turned: every bearing turns the other way, and nothing else happens.
 #[test]
 fn a_pure_turn_is_recovered() {
-    let mut studio = Studio::lab();
-    let home_pose = studio.world.home;
-    let home = studio.take(home_pose);
+    let home_pose = LAB.world.home;
+    let home = LAB.take(home_pose);
     let mut extractor = Extractor::new(ExtractorSettings::default(), &home);
     let snapshot = extractor.home_snapshot().bearings;
     for turn in [0.0, 0.011, -1.3, 3.1] {
-        let now = studio.take(Pose::new(home_pose.x, home_pose.y, home_pose.heading + turn));
+        let now = LAB.take(Pose::new(home_pose.x, home_pose.y, home_pose.heading + turn));
         let found = extractor.observe(&now);
         let off = |b: &Bearing| azimuth_of(&snapshot, *b).map_or(f64::NAN, |home| wrap(b.azimuth_rad - home + turn).abs());
         let right = found.iter().filter(|b| off(b) < 0.5_f64.to_radians()).count();
@@ -191,10 +193,9 @@ fn the_seam_is_a_column_like_any_other() {
         }
         out
     }
-    let mut studio = Studio::lab();
-    let home_pose = studio.world.home;
-    let home = studio.take(home_pose);
-    let now = studio.take(Pose::new(home_pose.x + 0.6, home_pose.y - 0.4, 0.7));
+    let home_pose = LAB.world.home;
+    let home = LAB.take(home_pose);
+    let now = LAB.take(Pose::new(home_pose.x + 0.6, home_pose.y - 0.4, 0.7));
     let width = f64::from(now.projection.width);
     let mut extractor = Extractor::new(ExtractorSettings::default(), &home);
     extractor.observe(&now);
@@ -225,19 +226,18 @@ fn the_seam_is_a_column_like_any_other() {
 /// The same room newly papered is another place: next to nothing is taken for a landmark.
 #[test]
 fn another_place_yields_no_bearings() {
-    let mut studio = Studio::lab();
-    let home_pose = studio.world.home;
-    let home = studio.take(home_pose);
+    let home_pose = LAB.world.home;
+    let home = LAB.take(home_pose);
     let mut extractor = Extractor::new(ExtractorSettings::default(), &home);
     assert!(extractor.observe(&Panorama::black(home.projection)).is_empty());
-    let world = &mut studio.world;
+    let mut world = LAB.world.clone();
     let bodies = world.bodies.iter_mut().map(|b| &mut b.texture);
     for texture in bodies.chain(&mut world.wall_textures).chain([&mut world.floor_texture]) {
         texture.seed = texture.seed.map(|seed| seed ^ 0x5eed);
     }
-    studio.scene = Scene::new(&studio.world).expect("it can be rendered");
+    let papered = Studio::new(world);
     let found: Vec<_> =
-        around(home_pose, 1.0).chain([home_pose]).map(|pose| extractor.observe(&studio.take(pose)).len()).collect();
+        around(home_pose, 1.0).chain([home_pose]).map(|pose| extractor.observe(&papered.take(pose)).len()).collect();
     assert!(
         found.iter().filter(|n| **n == 0).count() >= 7 && found.iter().all(|n| *n < 25),
         "landmarks in another place: {found:?}"
@@ -246,11 +246,10 @@ fn another_place_yields_no_bearings() {
 
 #[test]
 fn observations_repeat_and_are_in_order() {
-    let mut studio = Studio::lab();
-    let home_pose = studio.world.home;
-    let home = studio.take(home_pose);
-    let far = studio.take(Pose::new(home_pose.x - 1.5, home_pose.y + 0.8, 2.0));
-    let near = studio.take(Pose::new(home_pose.x + 0.1, home_pose.y, 0.0));
+    let home_pose = LAB.world.home;
+    let home = LAB.take(home_pose);
+    let far = LAB.take(Pose::new(home_pose.x - 1.5, home_pose.y + 0.8, 2.0));
+    let near = LAB.take(Pose::new(home_pose.x + 0.1, home_pose.y, 0.0));
     let mut extractor = Extractor::new(ExtractorSettings::default(), &home);
     let first = extractor.observe(&far);
     extractor.observe(&near);

@@ -148,7 +148,7 @@ fn blur(source: &Image, target: &mut Image, line: &mut Vec<f32>) {
 fn halve(source: &Image, target: &mut Image) {
     let width = source.width / 2;
     target.resize(width, source.height.div_ceil(2));
-    let even = source.width % 2 == 0;
+    let even = source.width.is_multiple_of(2);
     let step = source.width as f32 / width as f32;
     for y in 0..target.height {
         let from = source.row(2 * y);
