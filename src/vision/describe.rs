@@ -2,7 +2,8 @@
 //!
 //! A grid of 16 x 16 samples around the feature, spaced in proportion to its scale, is turned into gradients; those are
 //! summed into 4 x 4 cells of 8 directions each (Lowe 2004), upright. The square roots of the normalised sums are stored
-//! (Arandjelovic and Zisserman 2012), which makes the Euclidean distance of descriptors the Hellinger distance of histograms.
+//! (Arandjelovic and Zisserman 2012) and compared by the sum of absolute differences: on rendered rooms this told right matches
+//! from wrong ones at least as well as the Euclidean distance, and it is the fastest distance that a processor has.
 
 use std::f32::consts::SQRT_2;
 
@@ -22,24 +23,19 @@ const DIRECTIONS: usize = 8;
 /// Norm of a descriptor; entries rarely come near 255.
 const NORM: f32 = 512.0;
 
-/// A descriptor; entries are 0 to 255 and kept as `i16`, which multiplies fastest.
-pub(super) type Descriptor = [i16; LENGTH];
+/// A descriptor.
+pub(super) type Descriptor = [u8; LENGTH];
 
-/// Squared Euclidean distance of two descriptors, in units of `DISTANCE_SCALE`.
+/// Distance of two descriptors: the sum of absolute differences. Written by blocks of 16, for which compilers know one
+/// instruction; inlined into a loop they miss it.
+#[inline(never)]
 pub(super) fn distance(a: &Descriptor, b: &Descriptor) -> u32 {
-    let sum: i32 = a
-        .iter()
-        .zip(b)
-        .map(|(a, b)| {
-            let d = a - b;
-            i32::from(d) * i32::from(d)
-        })
-        .sum();
-    sum as u32
+    let block = |(a, b): (&[u8; 16], &[u8; 16])| a.iter().zip(b).map(|(a, b)| u32::from(a.abs_diff(*b))).sum::<u32>();
+    a.as_chunks().0.iter().zip(b.as_chunks().0).map(block).sum()
 }
 
-/// Squared distance of two descriptors that have nothing in common (orthogonal).
-pub(super) const DISTANCE_SCALE: f32 = 2.0 * NORM * NORM;
+/// The distance of unrelated descriptors, roughly.
+pub(super) const UNRELATED: f32 = 6000.0;
 
 /// Weights of the sums: how much sample `k` of a row or column counts for cell `c`, linear between cell centres and faded
 /// towards the border of the grid.
@@ -98,7 +94,7 @@ impl Describer {
         let total: f32 = flat.iter().sum::<f32>().max(f32::MIN_POSITIVE);
         let mut descriptor = [0; LENGTH];
         for (entry, sum) in descriptor.iter_mut().zip(flat) {
-            *entry = (NORM * (sum / total).sqrt() + 0.5).min(255.0) as i16;
+            *entry = (NORM * (sum / total).sqrt() + 0.5).min(255.0) as u8;
         }
         descriptor
     }

@@ -4,7 +4,7 @@
 //! the landmark's height over its size, wherever it is seen from. Only features that agree in this number are compared at
 //! all, which saves most of the work and many wrong matches.
 
-use super::describe::{DISTANCE_SCALE, Descriptor, distance};
+use super::describe::{Descriptor, UNRELATED, distance};
 use super::detect::Feature;
 
 /// Two features that may be the same landmark.
@@ -14,7 +14,7 @@ pub(super) struct Candidate {
     pub now: usize,
     /// Index of the home feature.
     pub home: usize,
-    /// Squared descriptor distance, 0 (equal) to 1 (nothing in common).
+    /// Descriptor distance, 0 (equal) to about 1 (unrelated).
     pub distance: f32,
 }
 
@@ -23,37 +23,57 @@ pub(super) struct Candidate {
 pub(super) struct Choice {
     /// The candidate.
     pub candidate: Candidate,
-    /// Its distance over that of the runner-up (both squared); small is distinct.
+    /// Its distance over that of the runner-up; small is distinct.
     pub ratio: f32,
 }
 
-/// Features of the home panorama, ready to be matched.
+/// The home features, ready to be compared: sorted by height over size.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Gallery {
-    /// Home features sorted by height over size, with their index.
-    order: Vec<(f32, usize)>,
-    /// Descriptors of feature k in `variants` horizontal stretches, the first of them 1, from k * variants on.
-    descriptors: Vec<Descriptor>,
+    entries: Vec<Entry>,
+    plain: Vec<Descriptor>,
+    /// Horizontally stretched descriptors, `variants` of each feature.
+    stretched: Vec<Descriptor>,
     variants: usize,
 }
 
-/// Height over size: rows above the horizon in units of the scale.
+#[derive(Debug, Clone, Copy)]
+struct Entry {
+    height_over_size: f32,
+    sigma: f32,
+    feature: usize,
+}
+
+/// Rows above the horizon in units of the scale.
 fn height_over_size(feature: &Feature, horizon: f32) -> f32 {
     (horizon - feature.y) / feature.sigma
 }
 
+/// Largest change of scale between two sightings of a landmark.
+const ZOOM: f32 = 4.5;
+
 impl Gallery {
-    pub fn new(features: &[Feature], descriptors: Vec<Descriptor>, variants: usize, horizon: f32) -> Self {
-        let mut order: Vec<_> = features.iter().enumerate().map(|(k, f)| (height_over_size(f, horizon), k)).collect();
-        order.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        Self { order, descriptors, variants }
+    /// Describes every feature once plain and once for each of `stretches` by `describe(feature, stretch)`. `horizon` is the row of
+    /// the horizon.
+    pub fn new(features: &[Feature], stretches: &[f32], horizon: f32, describe: impl Fn(&Feature, f32) -> Descriptor) -> Self {
+        let mut entries: Vec<_> = features
+            .iter()
+            .enumerate()
+            .map(|(k, f)| Entry { height_over_size: height_over_size(f, horizon), sigma: f.sigma, feature: k })
+            .collect();
+        entries.sort_by(|a, b| a.height_over_size.total_cmp(&b.height_over_size).then(a.feature.cmp(&b.feature)));
+        let plain = entries.iter().map(|e| describe(&features[e.feature], 1.0)).collect();
+        let mut stretched = Vec::with_capacity(entries.len() * stretches.len());
+        for entry in &entries {
+            stretched.extend(stretches.iter().map(|s| describe(&features[entry.feature], *s)));
+        }
+        Self { entries, plain, stretched, variants: stretches.len() }
     }
 
-    /// Compares all features that agree in height over size. Candidates come grouped by current feature; those with a distance
-    /// above `limit` are left out.
+    /// Compares the current features with those home features that agree in height over size to within `slack` (an absolute
+    /// and a relative part). Candidates come grouped by current feature; those with a distance above `limit` are left out.
     pub fn compare(
         &self,
-        home: &[Feature],
         now: &[Feature],
         descriptors: &[Descriptor],
         horizon: f32,
@@ -62,29 +82,27 @@ impl Gallery {
         candidates: &mut Vec<Candidate>,
     ) {
         candidates.clear();
-        let hopeless = (2.5 * limit * DISTANCE_SCALE) as u32;
-        let limit = (limit * DISTANCE_SCALE) as u32;
+        // Stretching brings what is related nearer, not what is unrelated.
+        let hopeless = (1.3 * limit * UNRELATED) as u32;
+        let limit = (limit * UNRELATED) as u32;
         for (n, (feature, descriptor)) in now.iter().zip(descriptors).enumerate() {
             let height = height_over_size(feature, horizon);
             let reach = slack.0 + slack.1 * height.abs();
-            let from = self.order.partition_point(|(h, _)| *h < height - reach);
-            for &(_, k) in self.order[from..].iter().take_while(|(h, _)| *h <= height + reach) {
-                let ratio = feature.sigma / home[k].sigma;
-                if !(0.22..4.5).contains(&ratio) {
+            let from = self.entries.partition_point(|e| e.height_over_size < height - reach);
+            let to = self.entries.partition_point(|e| e.height_over_size <= height + reach);
+            for (k, (entry, plain)) in self.entries[from..to].iter().zip(&self.plain[from..to]).enumerate() {
+                if feature.sigma > ZOOM * entry.sigma || entry.sigma > ZOOM * feature.sigma {
                     continue;
                 }
-                let variants = &self.descriptors[k * self.variants..(k + 1) * self.variants];
-                let Some((plain, stretched)) = variants.split_first() else { continue };
                 let mut best = distance(descriptor, plain);
-                // Stretching brings what is related nearer, not what is unrelated.
                 if best > hopeless {
                     continue;
                 }
-                for variant in stretched {
+                for variant in &self.stretched[(from + k) * self.variants..][..self.variants] {
                     best = best.min(distance(descriptor, variant));
                 }
                 if best <= limit {
-                    candidates.push(Candidate { now: n, home: k, distance: best as f32 / DISTANCE_SCALE });
+                    candidates.push(Candidate { now: n, home: entry.feature, distance: best as f32 / UNRELATED });
                 }
             }
         }

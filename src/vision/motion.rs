@@ -261,3 +261,69 @@ pub(super) fn polish(pairs: &[Pair], start: PlanarMotion) -> PlanarMotion {
     }
     motion
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::{Pose, angle_of};
+
+    /// Sights of landmarks spread over a room, from home and from `pose` (home frame), in exact projection. The first
+    /// `wrong` of every ten are paired with the next landmark instead of themselves.
+    fn room(pose: Pose, wrong: usize) -> Vec<Pair> {
+        let mut stream = Seed(7).stream("test");
+        let mut unit = || (stream.next_u64() >> 11) as f64 / (1_u64 << 53) as f64;
+        let sights: Vec<Pair> = (0..200)
+            .map(|_| {
+                let place = Vector2::new(8.0 * unit() - 4.0, 6.0 * unit() - 3.0);
+                let (height, size) = (2.2 * unit() - 0.4, 0.05);
+                let sight = |p: Vector2<f64>| Sight {
+                    unit: direction(angle_of(p)),
+                    tan: height / p.norm(),
+                    variance: 1e-6,
+                    scale: size / p.norm(),
+                };
+                Pair { home: sight(place), now: sight(pose.inverse_transform(place)) }
+            })
+            .collect();
+        (0..sights.len())
+            .map(|k| {
+                let now = if k % 10 < wrong { sights[(k + 1) % sights.len()].now } else { sights[k].now };
+                Pair { home: sights[k].home, now }
+            })
+            .collect()
+    }
+
+    #[test]
+    fn exact_sights_fit_their_motion_and_no_other() {
+        let pose = Pose::new(1.2, -0.7, 2.0);
+        let motion = PlanarMotion { direction_rad: angle_of(pose.position()), turn_rad: pose.heading };
+        let pairs = room(pose, 0);
+        let count = |motion: PlanarMotion| {
+            let frame = motion.frame();
+            pairs.iter().filter(|p| frame.fit(&p.home, &p.now).possible && frame.fit(&p.home, &p.now).chi2 < CHI2_LIMIT).count()
+        };
+        assert_eq!(count(motion), pairs.len());
+        assert!(count(PlanarMotion { turn_rad: 2.2, ..motion }) < pairs.len() / 5);
+        assert!(count(PlanarMotion { direction_rad: wrap(motion.direction_rad + 3.0), ..motion }) < pairs.len() / 5);
+    }
+
+    #[test]
+    fn the_motion_is_found_among_wrong_matches() {
+        for (pose, wrong) in [(Pose::new(1.2, -0.7, 2.0), 6), (Pose::new(-0.2, 0.1, -0.4), 6), (Pose::new(0.0, 2.4, 3.0), 5)] {
+            let found = estimate(&room(pose, wrong), 300, Seed(0)).expect("a motion");
+            assert!(wrap(found.direction_rad - angle_of(pose.position())).abs() < 0.01, "{pose:?}: {found:?}");
+            assert!(wrap(found.turn_rad - pose.heading).abs() < 0.01, "{pose:?}: {found:?}");
+        }
+    }
+
+    #[test]
+    fn a_pure_turn_needs_no_direction() {
+        let found = estimate(&room(Pose::new(0.0, 0.0, -2.5), 3), 300, Seed(0)).expect("a motion");
+        assert!(wrap(found.turn_rad + 2.5).abs() < 0.005, "{found:?}");
+    }
+
+    #[test]
+    fn too_few_matches_give_no_motion() {
+        assert!(estimate(&room(Pose::new(1.0, 0.0, 0.0), 0)[..2], 300, Seed(0)).is_none());
+    }
+}

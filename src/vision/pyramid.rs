@@ -28,11 +28,13 @@ impl Image {
     }
 
     /// Row `y`.
+    #[inline]
     pub fn row(&self, y: usize) -> &[f32] {
         &self.data[y * self.width..(y + 1) * self.width]
     }
 
     /// Value between pixels: columns wrap, rows are clamped.
+    #[inline]
     pub fn sample(&self, x: f32, y: f32) -> f32 {
         let (x0, x1, fx) = split_cyclic(x, self.width);
         let (y0, y1, fy) = split_clamped(y, self.height);
@@ -44,6 +46,7 @@ impl Image {
 }
 
 /// The two columns around `x` and the share of the second; cyclic.
+#[inline]
 pub(super) fn split_cyclic(x: f32, width: usize) -> (usize, usize, f32) {
     let towards_zero = x as i32;
     let floor = towards_zero - i32::from(towards_zero as f32 > x);
@@ -53,6 +56,7 @@ pub(super) fn split_cyclic(x: f32, width: usize) -> (usize, usize, f32) {
 }
 
 /// The two rows around `y` and the share of the second; clamped.
+#[inline]
 pub(super) fn split_clamped(y: f32, height: usize) -> (usize, usize, f32) {
     let y = y.clamp(0.0, (height - 1) as f32);
     let y0 = y as usize;
@@ -144,7 +148,7 @@ fn blur(source: &Image, target: &mut Image, line: &mut Vec<f32>) {
 fn halve(source: &Image, target: &mut Image) {
     let width = source.width / 2;
     target.resize(width, source.height.div_ceil(2));
-    let even = source.width % 2 == 0;
+    let even = source.width.is_multiple_of(2);
     let step = source.width as f32 / width as f32;
     for y in 0..target.height {
         let from = source.row(2 * y);
