@@ -195,6 +195,11 @@ fn choice<T: Copy + Send + Sync + 'static>(choices: &'static [Choice<T>]) -> imp
         .try_map(|given| choices.iter().find(|(_, name, _)| *name == given).map(|(value, ..)| *value).ok_or("unknown name"))
 }
 
+/// What `--bearings` calls a sensor.
+pub fn bearings_name(bearings: Bearings) -> &'static str {
+    BEARINGS.iter().find(|(value, ..)| *value == bearings).map_or("", |(_, name, _)| name)
+}
+
 /// A finite number.
 fn number(text: &str) -> Result<f64, String> {
     text.trim().parse().ok().filter(|v: &f64| v.is_finite()).ok_or_else(|| format!("`{text}` is not a finite number"))
