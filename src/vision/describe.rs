@@ -13,7 +13,7 @@ use super::pyramid::{Image, Pyramid, split_clamped, split_cyclic};
 /// Length of a descriptor.
 pub(super) const LENGTH: usize = 128;
 /// Samples along an edge of the grid.
-const GRID: usize = 16;
+const GRID: usize = 12;
 /// Samples with the ring that central differences need.
 const PATCH: usize = GRID + 2;
 /// Cells along an edge.

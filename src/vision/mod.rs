@@ -87,7 +87,7 @@ impl Default for ExtractorSettings {
             cell: 2.5,
             stretches: vec![0.7, 1.4],
             height_slack: (1.0, 0.35),
-            distance: 0.37,
+            distance: 0.385,
             ratio: 0.9,
             guided_ratio: 0.95,
             draws: 300,

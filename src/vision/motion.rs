@@ -21,6 +21,8 @@
 //! Two matches fix (d, alpha) in closed form; random pairs propose motions, all matches judge them, Gauss-Newton steps
 //! polish the best. Elevations serve only here, to tell right matches from wrong: what leaves vision is azimuths.
 
+use std::f64::consts::PI;
+
 use rand_pcg::rand_core::Rng;
 
 use crate::geometry::{Vector2, cross, direction, wrap};
@@ -221,26 +223,28 @@ fn judge(pairs: &[Pair], motion: PlanarMotion) -> (f64, PlanarMotion) {
     if support[0] >= support[1] {
         (support[0], motion)
     } else {
-        (support[1], PlanarMotion { direction_rad: wrap(motion.direction_rad + std::f64::consts::PI), ..motion })
+        (support[1], PlanarMotion { direction_rad: wrap(motion.direction_rad + PI), ..motion })
     }
 }
 
-/// Least squares over the matches that fit, by a few damped Gauss-Newton steps.
+/// Least squares over the matches that fit, by a few damped Gauss-Newton steps. The first steps take in more of the matches: the
+/// narrow valley around the answer has false bottoms beside it.
 pub(super) fn polish(pairs: &[Pair], start: PlanarMotion) -> PlanarMotion {
     let mut motion = start;
-    for _ in 0..4 {
+    for widening in [64.0, 16.0, 4.0, 1.0, 1.0] {
+        let limit = widening * CHI2_LIMIT;
         let frame = motion.frame();
         let (mut dd, mut da, mut aa, mut gd, mut ga) = (0.0, 0.0, 0.0, 0.0, 0.0);
         for pair in pairs {
             let (home, now) = (&pair.home, &pair.now);
             let fit = frame.fit(home, now);
-            if !fit.possible || fit.chi2 > CHI2_LIMIT {
+            if !fit.possible || fit.chi2 > limit {
                 continue;
             }
             let angles = frame.angles(home, now);
             let (error, spread) = Frame::residual(&angles, home, now);
             let (a_cos, b_cos) = (angles.home.1, angles.now.1);
-            let weight = (1.0 - fit.chi2 / CHI2_LIMIT) / spread;
+            let weight = (1.0 - fit.chi2 / limit) / spread;
             let by_direction = home.tan * b_cos - now.tan * a_cos;
             let by_turn = -home.tan * b_cos;
             dd += weight * by_direction * by_direction;
