@@ -1,6 +1,6 @@
 //! Control laws: from the believed pose to wheel commands.
 //!
-//! A law steers; a governor sets the speed. Both see only an [`Estimate`]'s pose and the data sheets, never the simulator.
+//! A law steers; a governor sets the speed. Both see only an estimate's pose and the data sheets, never the simulator.
 
 use crate::geometry::{Pose, Twist, angle_of, wrap};
 use crate::observation::{RobotSheet, TaskSheet};
