@@ -71,8 +71,9 @@ impl Describer {
         );
         // Rows first: each row of samples counts for the cell rows next to it.
         let mut by_row = [[[0.0_f32; GRID]; DIRECTIONS]; CELLS];
+        let mut channels = [[0.0; GRID]; DIRECTIONS];
         for (j, row_weights) in self.weights.iter().enumerate() {
-            let channels = directions(&patch[j], &patch[j + 1], &patch[j + 2]);
+            directions(&patch[j], &patch[j + 1], &patch[j + 2], &mut channels);
             for (cells, weight) in by_row.iter_mut().zip(row_weights) {
                 if *weight > 0.0 {
                     for (to, from) in cells.as_flattened_mut().iter_mut().zip(channels.as_flattened()) {
@@ -102,8 +103,7 @@ impl Describer {
 
 /// Gradients of a row of samples, given with the rows above and below, as shares of the eight directions: each gradient is
 /// split between the two directions that enclose it such that the two shares as vectors add up to it. No angle is computed.
-fn directions(above: &[f32; PATCH], row: &[f32; PATCH], below: &[f32; PATCH]) -> [[f32; GRID]; DIRECTIONS] {
-    let mut channels = [[0.0; GRID]; DIRECTIONS];
+fn directions(above: &[f32; PATCH], row: &[f32; PATCH], below: &[f32; PATCH], channels: &mut [[f32; GRID]; DIRECTIONS]) {
     for i in 0..GRID {
         let gx = row[i + 2] - row[i];
         let gy = below[i + 1] - above[i + 1];
@@ -120,7 +120,6 @@ fn directions(above: &[f32; PATCH], row: &[f32; PATCH], below: &[f32; PATCH]) ->
         channels[5][i] = SQRT_2 * smaller(west, north);
         channels[7][i] = SQRT_2 * smaller(east, north);
     }
-    channels
 }
 
 /// The number, or 0 if it is negative; one instruction, since NaN does not occur here.
@@ -132,21 +131,25 @@ fn smaller(a: f32, b: f32) -> f32 {
     if a < b { a } else { b }
 }
 
-/// Samples an image on a grid around `centre` with the given steps (x, y), both in pixels of the image.
-fn cut(image: &Image, centre: (f32, f32), step: (f32, f32)) -> [[f32; PATCH]; PATCH] {
+/// Samples an image on a grid around `centre` with the given steps (x, y), both in pixels of the image. Returns the rows of
+/// the grid.
+fn cut(image: &Image<u16>, centre: (f32, f32), step: (f32, f32)) -> [[f32; PATCH]; PATCH] {
     let offset = |k: usize| k as f32 - 0.5 * (PATCH - 1) as f32;
-    let columns: [(usize, usize, f32); PATCH] =
-        std::array::from_fn(|k| split_cyclic(centre.0 + step.0 * offset(k), image.width));
-    std::array::from_fn(|j| {
+    let mut columns = [(0, 0, 0.0); PATCH];
+    for (k, column) in columns.iter_mut().enumerate() {
+        *column = split_cyclic(centre.0 + step.0 * offset(k), image.width);
+    }
+    let mut patch = [[0.0; PATCH]; PATCH];
+    for (j, samples) in patch.iter_mut().enumerate() {
         let (y0, y1, fy) = split_clamped(centre.1 + step.1 * offset(j), image.height);
         let (a, b) = (image.row(y0), image.row(y1));
-        std::array::from_fn(|i| {
-            let (x0, x1, fx) = columns[i];
-            let top = a[x0] + fx * (a[x1] - a[x0]);
-            let bottom = b[x0] + fx * (b[x1] - b[x0]);
-            top + fy * (bottom - top)
-        })
-    })
+        for (sample, &(x0, x1, fx)) in samples.iter_mut().zip(&columns) {
+            let (a0, a1, b0, b1) = (f32::from(a[x0]), f32::from(a[x1]), f32::from(b[x0]), f32::from(b[x1]));
+            let (left, right) = (a0 + fy * (b0 - a0), a1 + fy * (b1 - a1));
+            *sample = left + fx * (right - left);
+        }
+    }
+    patch
 }
 
 #[cfg(test)]
@@ -159,7 +162,8 @@ mod tests {
             let (s, c) = crate::geometry::sin_cos(std::f64::consts::TAU * f64::from(k) / 64.0);
             // A plane that rises along (c, s); central differences span two samples.
             let row = |y: f64| std::array::from_fn(|x| (c * x as f64 + s * y) as f32);
-            let channels = directions(&row(0.0), &row(1.0), &row(2.0));
+            let mut channels = [[0.0; GRID]; DIRECTIONS];
+            directions(&row(0.0), &row(1.0), &row(2.0), &mut channels);
             let (mut x, mut y) = (0.0, 0.0);
             for (bin, channel) in channels.iter().enumerate() {
                 let (s, c) = crate::geometry::sin_cos(std::f64::consts::TAU * bin as f64 / 8.0);

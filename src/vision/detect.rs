@@ -4,7 +4,9 @@
 //! (Lowe 2004, on the half-octave pyramid). The robot turns about the vertical only, so features have no orientation: up is
 //! up in every picture.
 
-use super::pyramid::{BASE_SIGMA, Image, Pyramid};
+use std::f32::consts::TAU;
+
+use super::pyramid::{BASE_SIGMA, Image, Pyramid, UNITS};
 
 /// A feature of a panorama.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -33,12 +35,12 @@ pub(super) fn detect(pyramid: &Pyramid, criteria: &Criteria, scratch: &mut Scrat
         scan(pyramid, layer, criteria, scratch, features);
     }
     let width = pyramid.octaves[0].gauss[0].width as f32;
-    spread(features, width, criteria.spread_rad as f32 / std::f32::consts::TAU * width, criteria.limit)
+    spread(features, width, criteria)
 }
 
 /// A layer next to the one that is scanned, addressed in the pixels of that one.
 struct Neighbour<'a> {
-    image: &'a Image,
+    image: &'a Image<i16>,
     ratio_x: f32,
     ratio_y: f32,
 }
@@ -49,8 +51,9 @@ impl<'a> Neighbour<'a> {
         Self { image: &other.difference[layer % 2], ratio_x: own.step_x / other.step_x, ratio_y: own.step_y / other.step_y }
     }
 
+    /// Value in grey levels at (x, y) of the scanned layer.
     fn sample(&self, x: f32, y: f32) -> f32 {
-        self.image.sample(x * self.ratio_x, y * self.ratio_y)
+        self.image.sample(x * self.ratio_x, y * self.ratio_y) * (1.0 / UNITS)
     }
 
     /// Whether `value`, at row `y` and the middle one of three columns, lies further from 0 than this layer at and beside
@@ -59,12 +62,8 @@ impl<'a> Neighbour<'a> {
         let sign = value.signum();
         let least = sign * value;
         if self.ratio_x == 1.0 {
-            let row = self.image.row(y);
-            return sign * row[x] < least
-                && sign * row[left] < least
-                && sign * row[right] < least
-                && sign * self.image.row(y - 1)[x] < least
-                && sign * self.image.row(y + 1)[x] < least;
+            let at = |x: usize, y: usize| sign * f32::from(self.image.row(y)[x]) < UNITS * least;
+            return at(x, y) && at(left, y) && at(right, y) && at(x, y - 1) && at(x, y + 1);
         }
         let (x, y) = (x as f32, y as f32);
         let cross = [(0.0, 0.0), (-1.0, 0.0), (1.0, 0.0), (0.0, -1.0), (0.0, 1.0)];
@@ -83,6 +82,8 @@ pub(super) struct Criteria {
     pub spread_rad: f64,
     /// Most features.
     pub limit: usize,
+    /// Strongest features of the whole panorama that compete for those places; at least `limit`.
+    pub contenders: usize,
 }
 
 fn scan(pyramid: &Pyramid, layer: usize, criteria: &Criteria, scratch: &mut Scratch, features: &mut Vec<Feature>) {
@@ -97,7 +98,7 @@ fn scan(pyramid: &Pyramid, layer: usize, criteria: &Criteria, scratch: &mut Scra
         scratch.find(rows, criteria.contrast);
         for &x in &scratch.found {
             let (left, right) = (if x == 0 { width - 1 } else { x - 1 }, if x + 1 == width { 0 } else { x + 1 });
-            let patch = rows.map(|row| [row[left], row[x], row[right]]);
+            let patch = rows.map(|row| [row[left], row[x], row[right]].map(|v| f32::from(v) * (1.0 / UNITS)));
             let Some((dx, dy, peak, looseness)) = refine(&patch, criteria.edge_ratio) else { continue };
             let value = patch[1][1];
             let columns = [left, x, right];
@@ -129,29 +130,30 @@ fn scan(pyramid: &Pyramid, layer: usize, criteria: &Criteria, scratch: &mut Scra
 /// Buffers of the scan.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Scratch {
-    high: Vec<f32>,
-    low: Vec<f32>,
+    high: Vec<i16>,
+    low: Vec<i16>,
     mask: Vec<u8>,
     found: Vec<usize>,
 }
 
 impl Scratch {
-    /// Fills `found` with the columns whose value in the middle row is above `threshold` and above all eight neighbours, or
-    /// below both the negative threshold and all neighbours. Written as plain loops over whole rows, which vectorise; few
-    /// pixels are left for the costlier tests.
-    fn find(&mut self, rows: [&[f32]; 3], threshold: f32) {
+    /// Fills `found` with the columns whose value in the middle row is above `threshold` grey levels and above all eight
+    /// neighbours, or below both the negative threshold and all neighbours; of equal neighbours the left or upper one counts.
+    /// Written as plain loops over whole rows, which vectorise; few pixels are left for the costlier tests.
+    fn find(&mut self, rows: [&[i16]; 3], threshold: f32) {
         let [above, row, below] = rows;
         let width = row.len();
-        self.high.resize(width + 2, 0.0);
-        self.low.resize(width + 2, 0.0);
+        let threshold = (threshold * UNITS) as i16;
+        self.high.resize(width + 2, 0);
+        self.low.resize(width + 2, 0);
         // Buffers serve layers of all widths: what a wider one left behind the last column must not be found.
         self.mask.clear();
         self.mask.resize(width.next_multiple_of(8), 0);
         // Extremes of each column's three pixels, with a copy of the other end on either side.
         let columns = above.iter().zip(row).zip(below);
         for ((high, low), ((a, b), c)) in self.high[1..=width].iter_mut().zip(&mut self.low[1..=width]).zip(columns) {
-            *high = larger(larger(*a, *b), *c);
-            *low = smaller(smaller(*a, *b), *c);
+            *high = (*a).max(*b).max(*c);
+            *low = (*a).min(*b).min(*c);
         }
         (self.high[0], self.high[width + 1]) = (self.high[width], self.high[1]);
         (self.low[0], self.low[width + 1]) = (self.low[width], self.low[1]);
@@ -159,9 +161,9 @@ impl Scratch {
         let low = self.low[..width].iter().zip(&self.low[2..]);
         let columns = above.iter().zip(row).zip(below);
         for (((mask, (h0, h1)), (l0, l1)), ((a, b), c)) in self.mask.iter_mut().zip(high).zip(low).zip(columns) {
-            let top = larger(larger(larger(*h0, *h1), larger(*a, *c)), threshold);
-            let bottom = smaller(smaller(smaller(*l0, *l1), smaller(*a, *c)), -threshold);
-            *mask = u8::from(*b > top) | u8::from(*b < bottom);
+            let top = (*b > (*h0).max(*a).max(threshold)) & (*b >= (*h1).max(*c));
+            let bottom = (*b < (*l0).min(*a).min(-threshold)) & (*b <= (*l1).min(*c));
+            *mask = u8::from(top | bottom);
         }
         self.found.clear();
         for (k, eight) in self.mask.as_chunks::<8>().0.iter().enumerate() {
@@ -170,16 +172,6 @@ impl Scratch {
             }
         }
     }
-}
-
-/// The larger of two numbers; unlike `f32::max` one instruction, since NaN does not occur here.
-fn larger(a: f32, b: f32) -> f32 {
-    if a > b { a } else { b }
-}
-
-/// The smaller of two numbers.
-fn smaller(a: f32, b: f32) -> f32 {
-    if a < b { a } else { b }
 }
 
 /// Fits a quadric to a 3 x 3 patch. Returns the offset of its extremum, the value there and its looseness (see
@@ -209,21 +201,20 @@ fn refine(p: &[[f32; 3]; 3], edge_ratio: f32) -> Option<(f32, f32, f32, f32)> {
     Some((dx, dy, p[1][1] + 0.5 * (gx * dx + gy * dy), looseness))
 }
 
-/// How many times the features wanted compete for a place: the strongest of the whole picture.
-const PRESELECTION: usize = 3;
-
-/// Keeps `limit` features. Each of the strongest is ranked by how many stronger ones of its octave lie within `reach` columns, and the best
-/// ranked stay: rich corners of the room do not crowd out the poor ones, and no sector border makes a turn of the robot
-/// change the choice.
-fn spread(features: &mut Vec<Feature>, width: f32, reach: f32, limit: usize) -> f32 {
+/// Keeps the wanted number of features. The strongest of the panorama are ranked by how many stronger ones of their octave
+/// lie nearby in azimuth, and the best ranked stay: rich corners of the room do not crowd out the poor ones, and no sector
+/// border makes a turn of the robot change the choice. Returns the strength of the strongest that was not even ranked.
+fn spread(features: &mut Vec<Feature>, width: f32, criteria: &Criteria) -> f32 {
+    let Criteria { limit, contenders, .. } = *criteria;
+    let reach = criteria.spread_rad as f32 / TAU * width;
     let mut least = 0.0;
     let by_strength = |a: &Feature, b: &Feature| b.response.abs().total_cmp(&a.response.abs());
     let by_place = |a: &Feature, b: &Feature| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)).then(a.sigma.total_cmp(&b.sigma));
-    if features.len() > PRESELECTION * limit {
+    if features.len() > contenders {
         let order = |a: &Feature, b: &Feature| by_strength(a, b).then_with(|| by_place(a, b));
-        features.select_nth_unstable_by(PRESELECTION * limit, order);
-        least = features[PRESELECTION * limit].response.abs();
-        features.truncate(PRESELECTION * limit);
+        features.select_nth_unstable_by(contenders, order);
+        least = features[contenders].response.abs();
+        features.truncate(contenders);
     }
     if features.len() > limit {
         features.sort_by(|a, b| a.octave.cmp(&b.octave).then_with(|| by_place(a, b)));

@@ -42,6 +42,9 @@ pub struct ExtractorSettings {
     pub features: usize,
     /// Most features kept of the home panorama.
     pub home_features: usize,
+    /// How many times the features kept compete for a place: 1 keeps the strongest wherever they are, more spreads them over
+    /// azimuth and scale at the cost of strength.
+    pub contenders: f64,
     /// Features compete for their place with those within this azimuth on either side, rad.
     pub spread_rad: f64,
     /// Edge of one of the 4 x 4 cells of a descriptor in units of the feature's scale.
@@ -81,13 +84,14 @@ impl Default for ExtractorSettings {
             octaves: 4,
             contrast: 2.0,
             edge_ratio: 10.0,
-            features: 600,
-            home_features: 600,
+            features: 500,
+            home_features: 500,
+            contenders: 1.5,
             spread_rad: 0.15,
             cell: 2.5,
             stretches: vec![0.7, 1.4],
             height_slack: (1.0, 0.35),
-            distance: 0.385,
+            distance: 0.4,
             ratio: 0.9,
             guided_ratio: 0.95,
             draws: 300,
@@ -99,6 +103,12 @@ impl Default for ExtractorSettings {
             check_per_scale: 0.1,
             seed: 0,
         }
+    }
+}
+
+impl ExtractorSettings {
+    fn contenders(&self, kept: usize) -> usize {
+        (kept as f64 * self.contenders.max(1.0)) as usize
     }
 }
 
@@ -155,11 +165,13 @@ impl Extractor {
             edge_ratio: settings.edge_ratio,
             spread_rad: settings.spread_rad,
             limit: settings.home_features,
+            contenders: settings.contenders(settings.home_features),
         };
         let hopeless = detect::detect(&pyramid, &criteria, &mut scratch, &mut features);
         // Later panoramas show much the same surfaces: what is far too weak here need not be looked at there.
-        criteria.contrast = criteria.contrast.max(0.5 * hopeless);
+        criteria.contrast = criteria.contrast.max(0.75 * hopeless);
         criteria.limit = settings.features;
+        criteria.contenders = settings.contenders(settings.features);
         let projection = home.projection;
         let gallery = Gallery::new(&features, &settings.stretches, horizon(&projection), |feature, stretch| {
             describer.describe(&pyramid, feature, settings.cell, stretch)

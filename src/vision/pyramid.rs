@@ -6,30 +6,36 @@
 //! pyramid of Crowley and Riff (2003), a fourth of the work of the usual scale space with three steps an octave.
 //!
 //! Columns wrap round: the seam of the panorama is no border. Rows are clamped at top and bottom.
+//!
+//! Grey levels are kept in sixteenths, as 16-bit integers: twice as many fit a vector register as floats, and the binomial
+//! sums of them just do not overflow.
 
 use crate::panorama::Panorama;
 
 /// Octave-pixel standard deviation of the finest image of an octave; a step to the next is a factor sqrt 2.
 pub(super) const BASE_SIGMA: f32 = 1.0;
 
+/// Units of a pixel's value in one grey level of 255.
+pub(super) const UNITS: f32 = 16.0;
+
 /// A grey image whose columns are cyclic.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Image {
+pub(super) struct Image<T> {
     pub width: usize,
     pub height: usize,
-    pub data: Vec<f32>,
+    pub data: Vec<T>,
 }
 
-impl Image {
+impl<T: Copy + Default + Into<f32>> Image<T> {
     fn resize(&mut self, width: usize, height: usize) {
         self.width = width;
         self.height = height;
-        self.data.resize(width * height, 0.0);
+        self.data.resize(width * height, T::default());
     }
 
     /// Row `y`.
     #[inline]
-    pub fn row(&self, y: usize) -> &[f32] {
+    pub fn row(&self, y: usize) -> &[T] {
         &self.data[y * self.width..(y + 1) * self.width]
     }
 
@@ -39,8 +45,9 @@ impl Image {
         let (x0, x1, fx) = split_cyclic(x, self.width);
         let (y0, y1, fy) = split_clamped(y, self.height);
         let (a, b) = (self.row(y0), self.row(y1));
-        let top = a[x0] + fx * (a[x1] - a[x0]);
-        let bottom = b[x0] + fx * (b[x1] - b[x0]);
+        let (a0, a1, b0, b1): (f32, f32, f32, f32) = (a[x0].into(), a[x1].into(), b[x0].into(), b[x1].into());
+        let top = a0 + fx * (a1 - a0);
+        let bottom = b0 + fx * (b1 - b0);
         top + fy * (bottom - top)
     }
 }
@@ -67,9 +74,9 @@ pub(super) fn split_clamped(y: f32, height: usize) -> (usize, usize, f32) {
 #[derive(Debug, Clone, Default)]
 pub(super) struct Octave {
     /// Gaussian images of standard deviation 1, sqrt 2 and 2 pixels of this octave.
-    pub gauss: [Image; 3],
+    pub gauss: [Image<u16>; 3],
     /// Differences of neighbouring Gaussian images.
-    pub difference: [Image; 2],
+    pub difference: [Image<i16>; 2],
     /// Panorama columns per column of this octave. 2^octave but where a width was odd.
     pub step_x: f32,
     /// Panorama rows per row of this octave.
@@ -80,9 +87,9 @@ pub(super) struct Octave {
 #[derive(Debug, Clone, Default)]
 pub(super) struct Pyramid {
     pub octaves: Vec<Octave>,
-    luma: Image,
-    scratch: Image,
-    line: Vec<f32>,
+    luma: Image<u16>,
+    scratch: Image<u16>,
+    line: Vec<u16>,
 }
 
 impl Pyramid {
@@ -91,7 +98,8 @@ impl Pyramid {
         let (width, height) = (panorama.projection.width as usize, panorama.projection.height as usize);
         self.luma.resize(width, height);
         for (luma, p) in self.luma.data.iter_mut().zip(panorama.rgba.as_chunks::<4>().0) {
-            *luma = 0.299 * f32::from(p[0]) + 0.587 * f32::from(p[1]) + 0.114 * f32::from(p[2]);
+            // BT.601 weights in 256ths; the sum fills 16 bits.
+            *luma = (77 * u16::from(p[0]) + 150 * u16::from(p[1]) + 29 * u16::from(p[2])) >> 4;
         }
         let wanted = (0..octaves.max(1)).take_while(|&o| o == 0 || (height >> o >= 16 && width >> o >= 64)).count();
         self.octaves.resize_with(wanted, Octave::default);
@@ -121,15 +129,15 @@ impl Pyramid {
 }
 
 /// Convolves with the binomial (1 4 6 4 1) / 16 both ways: variance 1.
-fn blur(source: &Image, target: &mut Image, line: &mut Vec<f32>) {
+fn blur(source: &Image<u16>, target: &mut Image<u16>, line: &mut Vec<u16>) {
     let (width, height) = (source.width, source.height);
     target.resize(width, height);
-    line.resize(width + 4, 0.0);
+    line.resize(width + 4, 0);
     for y in 0..height {
         let row = |dy: isize| source.row(y.saturating_add_signed(dy).min(height - 1));
         let (a, b, c, d, e) = (row(-2), row(-1), row(0), row(1), row(2));
         for (((((out, a), b), c), d), e) in line[2..width + 2].iter_mut().zip(a).zip(b).zip(c).zip(d).zip(e) {
-            *out = (a + e) + 4.0 * (b + d) + 6.0 * c;
+            *out = binomial(*a, *b, *c, *d, *e);
         }
         // The line carries two columns of the other end on either side, so the seam needs no case of its own.
         line[0] = line[width];
@@ -139,13 +147,19 @@ fn blur(source: &Image, target: &mut Image, line: &mut Vec<f32>) {
         let out = &mut target.data[y * width..(y + 1) * width];
         let (a, b, c, d, e) = (&line[..width], &line[1..=width], &line[2..width + 2], &line[3..width + 3], &line[4..]);
         for (((((out, a), b), c), d), e) in out.iter_mut().zip(a).zip(b).zip(c).zip(d).zip(e) {
-            *out = ((a + e) + 4.0 * (b + d) + 6.0 * c) * (1.0 / 256.0);
+            *out = binomial(*a, *b, *c, *d, *e);
         }
     }
 }
 
+/// (1 4 6 4 1) / 16, rounded. At most 16 * 255 * 16 + 8 on the way: within 16 bits.
+#[inline]
+fn binomial(a: u16, b: u16, c: u16, d: u16, e: u16) -> u16 {
+    (a + e + 4 * (b + d) + 6 * c + 8) >> 4
+}
+
 /// Takes every other row and column; an odd width is resampled evenly to half of it, so that the turn stays closed.
-fn halve(source: &Image, target: &mut Image) {
+fn halve(source: &Image<u16>, target: &mut Image<u16>) {
     let width = source.width / 2;
     target.resize(width, source.height.div_ceil(2));
     let even = source.width.is_multiple_of(2);
@@ -160,16 +174,17 @@ fn halve(source: &Image, target: &mut Image) {
         } else {
             for (x, to) in to.iter_mut().enumerate() {
                 let (x0, x1, f) = split_cyclic(x as f32 * step, source.width);
-                *to = from[x0] + f * (from[x1] - from[x0]);
+                let (a, b) = (f32::from(from[x0]), f32::from(from[x1]));
+                *to = (a + f * (b - a) + 0.5) as u16;
             }
         }
     }
 }
 
-fn subtract(coarse: &Image, fine: &Image, target: &mut Image) {
+fn subtract(coarse: &Image<u16>, fine: &Image<u16>, target: &mut Image<i16>) {
     target.resize(coarse.width, coarse.height);
     for ((t, c), f) in target.data.iter_mut().zip(&coarse.data).zip(&fine.data) {
-        *t = c - f;
+        *t = c.wrapping_sub(*f) as i16;
     }
 }
 
@@ -220,7 +235,7 @@ mod tests {
         for x in 0..280 {
             let turn = std::f64::consts::TAU * f64::from(x as f32 * coarse.step_x) / 561.0;
             let expected = 127.5 + 100.0 * crate::geometry::sin_cos(3.0 * turn).0;
-            assert!((f64::from(coarse.gauss[0].row(20)[x]) - expected).abs() < 1.0, "column {x}");
+            assert!((f64::from(coarse.gauss[0].row(20)[x]) / f64::from(UNITS) - expected).abs() < 1.0, "column {x}");
         }
     }
 }
