@@ -42,7 +42,12 @@ fn title(world: &World, record: &Record) -> String {
         Outcome::Lost => "lost",
         Outcome::Stuck => "stuck",
     };
-    format!("{}: {outcome}, {:.1} cm from home after {:.1} s", world.spec.name, 100.0 * record.final_distance_m(), record.time_s)
+    format!(
+        "{}: {outcome}, {:.1} cm from home after {:.1} s",
+        world.spec.name,
+        100.0 * record.final_distance_m(),
+        record.time_s
+    )
 }
 
 fn positions(steps: &[Step], pose: impl Fn(&Step) -> Pose) -> impl Iterator<Item = Vector2<f64>> {
