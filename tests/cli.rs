@@ -287,3 +287,45 @@ fn worlds_can_be_checked_drawn_and_described() {
     let schema: Value = serde_json::from_slice(&schema.stdout).unwrap();
     assert!(schema["properties"]["room"].is_object(), "{schema}");
 }
+
+#[test]
+fn a_table_of_commands_is_driven_and_recorded() {
+    let folder = tempfile::tempdir().unwrap();
+    let table = |name: &str, rows: &str| {
+        std::fs::write(folder.path().join(name), format!("t_s,v_m_s,omega_rad_s\n{rows}")).unwrap();
+    };
+    table("turn.csv", "0,0.25,0\n1,0.2,0.8\n3.05,0,0\n");
+    let drive = |out: &str| {
+        let output = run(folder.path(), &["drive", LAB, "--commands", "turn.csv", "--seed", "5", "--json", "--out", out]);
+        assert_done(&output);
+        let read = |name: &str| std::fs::read_to_string(folder.path().join(out).join(name)).unwrap();
+        (read("drive.csv"), read("summary.json"), read("path.svg"))
+    };
+    let (csv, summary, drawing) = drive("first");
+    assert_eq!((csv.clone(), summary.clone(), drawing.clone()), drive("second"), "same seed, same bytes");
+    assert!(drawing.contains("<svg") && drawing.contains("odometry"));
+
+    // What the summary says must follow from the table beside it.
+    let summary: Value = serde_json::from_str(&summary).unwrap();
+    let rows: Vec<Vec<&str>> = csv.lines().map(|l| l.split(',').collect()).collect();
+    let column = |name: &str| rows[0].iter().position(|c| *c == name).expect(name);
+    let number = |row: &[&str], name: &str| row[column(name)].parse::<f64>().unwrap();
+    assert_eq!(rows.len(), 1 + 1 + 10 + 21, "a header, the start, and an interval of at most 0.1 s each");
+    let last = rows.last().unwrap();
+    assert_eq!((number(last, "t_s"), summary["time_s"].as_f64()), (3.05, Some(3.05)));
+    let drift = (number(last, "x_odom_m") - number(last, "x_m")).hypot(number(last, "y_odom_m") - number(last, "y_m"));
+    assert!((summary["odometry_drift_m"].as_f64().unwrap() - drift).abs() < 1e-12 && drift > 0.0);
+    // Forces over an interval make the momentum gained in it: here straight ahead, from rest.
+    let mass = 2.3;
+    let force: f64 = ["left", "right", "caster"].iter().map(|w| number(&rows[2], &format!("force_{w}_forward_n"))).sum();
+    let gained = mass * number(&rows[2], "v_forward_m_s");
+    assert!((force * 0.1 / gained - 1.0).abs() < 1e-3, "{force} N for 0.1 s against {gained} N s");
+
+    table("gap.csv", "0,0.25,0\n\n3,0,0\n");
+    table("back.csv", "0,0.25,0\n2,0.1,0\n1,0,0\n");
+    for (name, words) in [("gap.csv", ["gap.csv", "line 3", "blank"]), ("back.csv", ["back.csv", "line 4", "t_s"])] {
+        assert_fails(&run(folder.path(), &["drive", LAB, "--commands", name]), 1, &words);
+    }
+    assert_fails(&run(folder.path(), &["drive", LAB]), 2, &["--commands"]);
+    assert!(!folder.path().join("results").exists(), "a failure leaves no folder behind");
+}

@@ -20,6 +20,19 @@ const EXIT_CODES: &str = "Exit codes:
 
 /// Heading of the flags that all subcommands have.
 const GENERAL: &str = "General options";
+/// Shown under `drive --help`.
+const DRIVE_HELP: &str = "Commands are CSV with a header, times from 0 on:
+  t_s,v_m_s,omega_rad_s
+  0,0.3,0
+  2,0.2,0.8
+  5,0,0
+Each row holds until the time of the next; the last row is the end.
+
+Exit codes:
+  0    done
+  1    failed: a file or a folder
+  2    usage: an argument or one of its values is not allowed
+  130  interrupted by Ctrl-C; nothing half written is left behind";
 
 /// Headless, physics-simulated robot testbed for bearing-only visual homing
 #[derive(Debug, Parser)]
@@ -51,6 +64,9 @@ pub enum Command {
     /// Drive home: one closed-loop run, or one a seed
     #[command(after_help = EXIT_CODES)]
     Home(Box<HomeArgs>),
+    /// Drive a table of commands open loop and record truth, odometry, wheels, slip and forces
+    #[command(after_help = DRIVE_HELP)]
+    Drive(DriveArgs),
     /// Render one panorama with range and instance ids
     #[command(after_help = EXIT_CODES)]
     Render(RenderArgs),
@@ -107,6 +123,25 @@ pub struct HomeArgs {
     #[arg(long, value_name = "SHARE", allow_negative_numbers = true, value_parser = share)]
     pub noise_false: Option<f64>,
     /// Folder for the results [default: results/runs/home-WORLD-SEED]
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+}
+
+/// Arguments of `drive`.
+#[derive(Debug, clap::Args)]
+pub struct DriveArgs {
+    /// World file, or the name of a built-in world
+    pub world: String,
+    /// Table of commands: t_s, v_m_s, omega_rad_s
+    #[arg(long, value_name = "FILE.csv")]
+    pub commands: PathBuf,
+    /// Start: `random`, the name of one of the world's starts, or a pose x,y,heading_deg [default: the world's home]
+    #[arg(long, allow_hyphen_values = true, value_parser = start)]
+    pub start: Option<Start>,
+    /// Seed of the run
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub seed: u64,
+    /// Folder for the results [default: results/runs/drive-WORLD-SEED]
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
 }

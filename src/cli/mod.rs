@@ -5,6 +5,7 @@
 
 pub mod args;
 mod context;
+mod drive;
 mod home;
 mod render;
 mod world;
@@ -27,6 +28,7 @@ pub enum Verdict {
 pub fn run(args: Args) -> Result<Verdict> {
     let context = Context::new(&args.common)?;
     match args.command {
+        Command::Drive(args) => drive::run(&args, &context),
         Command::Home(args) => home::run(&args, &context),
         Command::Render(args) => render::run(&args, &context),
         Command::World(args) => world::run(&args, &context),

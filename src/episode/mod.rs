@@ -5,9 +5,12 @@
 //! ([`crate::observation::Method`]) turns bearings and odometry into the next command. Only the loop in this module sees both
 //! the truth and the method's belief; it writes both into a [`Record`], and [`Summary`] compares them.
 //!
+//! [`open_loop`] drives the plant by a table of commands, without sensor and method.
+//!
 //! [`Setup`] says which parts to take, and a [`Bench`] builds them for one world and runs seeds on it.
 
 pub mod method;
+pub mod open_loop;
 mod record;
 mod run;
 pub mod sensor;
@@ -18,4 +21,4 @@ pub use record::{Outcome, Pictures, Record, Step, Timing};
 pub use run::{Parts, Progress, run};
 pub use sensor::Sensor;
 pub use setup::{Bearings, Bench, PlantKind, Setup, Start};
-pub use summary::{EstimateErrors, Landmarks, PoseRecord, SetupRecord, Summary};
+pub use summary::{CollisionRecord, EstimateErrors, Landmarks, PoseRecord, SetupRecord, Summary};

@@ -5,6 +5,7 @@ use serde::Serialize;
 use crate::geometry::{Pose, Twist};
 use crate::observation::Estimate;
 use crate::panorama::Panorama;
+use crate::physics::Collision;
 use crate::render::RendererInfo;
 
 /// How an episode ended.
@@ -103,8 +104,8 @@ pub struct Record {
     pub time_s: f64,
     /// Control steps, first to last. The rows after `time_s` are the robot coming to rest.
     pub steps: Vec<Step>,
-    /// Contacts with walls and bodies.
-    pub collisions: u32,
+    /// Contacts with walls and bodies as they began.
+    pub collisions: Vec<Collision>,
     /// Where home is, in the room.
     pub home: Pose,
     /// Bearings in the home snapshot.

@@ -8,7 +8,7 @@ use super::sensor::Sensor;
 use crate::error::{Error, Result};
 use crate::geometry::{Pose, Twist, wrap};
 use crate::observation::{Estimate, Method, Observation, Odometry, Status};
-use crate::physics::Plant;
+use crate::physics::{Collision, Plant};
 use crate::world::TaskSpec;
 
 /// Longest time given to the robot to coast to rest after the end, s.
@@ -151,7 +151,7 @@ struct Drive<'a> {
     odometry: Odometry,
     slip_m_s: [f64; 2],
     dead_reckoned: Pose,
-    collisions: u32,
+    collisions: Vec<Collision>,
     physics_s: f64,
 }
 
@@ -164,7 +164,7 @@ impl<'a> Drive<'a> {
             odometry: Odometry::default(),
             slip_m_s: [0.0; 2],
             dead_reckoned,
-            collisions: 0,
+            collisions: Vec::new(),
             physics_s: 0.0,
         }
     }
@@ -176,7 +176,7 @@ impl<'a> Drive<'a> {
         self.physics_s += moving.elapsed().as_secs_f64();
         self.odometry = moved.odometry;
         self.slip_m_s = moved.slip_m_s;
-        self.collisions += moved.collisions;
+        self.collisions.extend_from_slice(self.plant.collisions());
         self.dead_reckoned = self.dead_reckoned.advanced(moved.odometry.twist, moved.odometry.dt_s);
     }
 

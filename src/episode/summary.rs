@@ -8,6 +8,7 @@ use super::record::{Outcome, Record, Step, Timing};
 use super::setup::{Bearings, PlantKind, Setup};
 use crate::geometry::{Pose, angle_of, wrap};
 use crate::observation::Estimate;
+use crate::physics::Collision;
 use crate::render::RendererInfo;
 use crate::world::World;
 
@@ -38,7 +39,9 @@ pub struct Summary {
     /// Home pose, in the room.
     pub home: PoseRecord,
     /// Contacts with walls and bodies.
-    pub collisions: u32,
+    pub collisions: usize,
+    /// Each of them.
+    pub collision_list: Vec<CollisionRecord>,
     /// Distance at the end between odometry alone and the truth, m.
     pub odometry_drift_m: f64,
     /// Errors of the method's belief; `None` for a method without one.
@@ -72,6 +75,26 @@ pub struct PoseRecord {
     pub y_m: f64,
     /// Heading, rad.
     pub heading_rad: f64,
+}
+
+/// A contact with a wall or body as JSON has it.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct CollisionRecord {
+    /// When it began, s.
+    pub time_s: f64,
+    /// With what: `wall 2`, `desk`.
+    pub with: String,
+    /// Impulse of the hit on the robot, N s.
+    pub impulse_n_s: f64,
+}
+
+impl CollisionRecord {
+    /// Collisions by the names that `world` has for things.
+    #[must_use]
+    pub fn list(collisions: &[Collision], world: &World) -> Vec<Self> {
+        let record = |c: &Collision| Self { time_s: c.time_s, with: c.with.name(world), impulse_n_s: c.impulse_n_s };
+        collisions.iter().map(record).collect()
+    }
 }
 
 impl From<Pose> for PoseRecord {
@@ -181,7 +204,8 @@ impl Summary {
             start_distance_m,
             start: start.into(),
             home: record.home.into(),
-            collisions: record.collisions,
+            collisions: record.collisions.len(),
+            collision_list: CollisionRecord::list(&record.collisions, world),
             odometry_drift_m: record.odometry_drift_m(),
             estimate: EstimateErrors::new(record),
             landmarks: Landmarks {

@@ -8,11 +8,13 @@ use rapier2d::prelude::{
     Rotation, Vector,
 };
 
+use super::Struck;
 use super::chassis::PlanarVelocity;
 use super::movers::is_solid;
 use super::polygon::{contains, edges, segments_cross};
+use super::slide::SlidingBody;
 use crate::geometry::{Pose, Vector2, atan2, sin_cos};
-use crate::world::{Footprint, World};
+use crate::world::{Footprint, MotionSpec, World};
 
 /// Coulomb friction of the robot's hull on walls and bodies.
 const HULL_FRICTION: f32 = 0.3;
@@ -35,12 +37,20 @@ pub(super) struct Touch {
 }
 
 /// Outcome of a substep.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub(super) struct ArenaStep {
     /// Rapier's motion, where the robot was within 2 mm of something; nothing where it was free.
     pub(super) touch: Option<Touch>,
-    /// Contacts that began.
-    pub(super) began: u32,
+    /// Contacts that began: with what, and their impulse so far, N s.
+    pub(super) began: Vec<(Struck, f64)>,
+}
+
+/// A body that can be pushed.
+struct Loose {
+    /// Its index in the world.
+    index: usize,
+    handle: RigidBodyHandle,
+    slide: SlidingBody,
 }
 
 /// Rapier's copy of the room.
@@ -48,8 +58,10 @@ pub(super) struct Arena {
     physics: PhysicsWorld,
     robot: RigidBodyHandle,
     hull: ColliderHandle,
-    /// Moving bodies that the robot can run into, with their index in the world.
+    /// Bodies that move by themselves and that the robot can run into, with their index in the world.
     movers: Vec<(usize, RigidBodyHandle)>,
+    /// Bodies that can be pushed.
+    loose: Vec<Loose>,
     /// What the robot touches now.
     touching: Vec<ColliderHandle>,
 }
@@ -64,14 +76,20 @@ impl Arena {
         physics.integration_parameters.num_solver_iterations = 1;
 
         let hard = |shape: ColliderBuilder| shape.friction(HULL_FRICTION).restitution(HULL_RESTITUTION).density(0.0);
-        for [a, b, apex] in walls(&world.outline) {
-            physics.insert_collider(hard(ColliderBuilder::triangle(vector(a), vector(b), vector(apex))), None);
+        for (k, [a, b, apex]) in walls(&world.outline).enumerate() {
+            let wall = hard(ColliderBuilder::triangle(vector(a), vector(b), vector(apex)));
+            physics.insert_collider(wall.user_data(mark(Struck::Wall(k))), None);
         }
         let robot_spec = &world.spec.robot;
         let mut movers = Vec::new();
+        let mut loose = Vec::new();
         for (index, body) in world.bodies.iter().enumerate().filter(|(_, b)| is_solid(b, robot_spec.height_m)) {
-            let shape = hard(shape(&body.footprint));
-            if body.motion.is_some() {
+            let shape = hard(shape(&body.footprint)).user_data(mark(Struck::Body(index)));
+            if let Some(MotionSpec::Pushed { mass_kg, friction }) = body.motion {
+                let dynamic = RigidBodyBuilder::dynamic().pose(rapier_pose(&body.pose)).can_sleep(false);
+                let handle = physics.insert(dynamic, shape.mass(mass_kg as f32)).0;
+                loose.push(Loose { index, handle, slide: SlidingBody::new(&body.footprint, friction) });
+            } else if body.motion.is_some() {
                 let kinematic = RigidBodyBuilder::kinematic_position_based().pose(rapier_pose(&body.pose)).can_sleep(false);
                 movers.push((index, physics.insert(kinematic, shape).0));
             } else {
@@ -83,7 +101,7 @@ impl Arena {
         let body =
             RigidBodyBuilder::dynamic().pose(rapier_pose(&start)).additional_mass_properties(mass).can_sleep(false).build();
         let (robot, hull) = physics.insert(body, hard(ColliderBuilder::ball(robot_spec.radius_m as f32)));
-        Self { physics, robot, hull, movers, touching: Vec::new() }
+        Self { physics, robot, hull, movers, loose, touching: Vec::new() }
     }
 
     /// Where each moving body will be at the end of the next substep.
@@ -103,6 +121,14 @@ impl Arena {
             robot.set_linvel(vector(velocity.linear), false);
             robot.set_angvel(velocity.yaw_rate as f32, false);
         }
+        for loose in &self.loose {
+            if let Some(body) = self.physics.bodies.get_mut(loose.handle) {
+                let velocity = PlanarVelocity { linear: from_vector(body.linvel()), yaw_rate: f64::from(body.angvel()) };
+                let slowed = loose.slide.slowed(&velocity, dt);
+                body.set_linvel(vector(slowed.linear), false);
+                body.set_angvel(slowed.yaw_rate as f32, false);
+            }
+        }
         self.physics.integration_parameters.dt = dt as f32;
         self.physics.step();
 
@@ -119,26 +145,54 @@ impl Arena {
         ArenaStep { touch, began }
     }
 
-    /// Whether the robot is close to anything, and how many contacts began. A contact begins when it first carries an
+    /// Where the bodies that can be pushed are now, by their index in the world.
+    pub(super) fn loose_poses(&self) -> impl Iterator<Item = (usize, Pose)> + '_ {
+        self.loose.iter().filter_map(|loose| {
+            let pose = self.physics.bodies.get(loose.handle)?.position();
+            let heading = atan2(f64::from(pose.rotation.im), f64::from(pose.rotation.re));
+            let position = from_vector(pose.translation);
+            Some((loose.index, Pose::new(position.x, position.y, heading)))
+        })
+    }
+
+    /// Whether the robot is close to anything, and which contacts began. A contact begins when it first carries an
     /// impulse and ends when the gap has grown beyond what rapier foresees, so that a robot that rattles along a wall counts
     /// once.
-    fn watch_contacts(&mut self) -> (bool, u32) {
+    fn watch_contacts(&mut self) -> (bool, Vec<(Struck, f64)>) {
         let mut near = Vec::new();
-        let mut began = 0;
+        let mut began = Vec::new();
         for pair in self.physics.narrow_phase.contact_pairs_with(self.hull) {
             if !pair.has_any_active_contact() {
                 continue;
             }
             let other = if pair.collider1 == self.hull { pair.collider2 } else { pair.collider1 };
             let known = self.touching.contains(&other);
-            let touches = known || pair.total_impulse_magnitude() > 0.0;
+            let impulse = pair.total_impulse_magnitude();
+            let touches = known || impulse > 0.0;
             near.push((other, touches));
-            began += u32::from(touches && !known);
+            if touches && !known {
+                let mark = self.physics.colliders.get(other).map_or(0, |collider| collider.user_data);
+                began.push((struck(mark), f64::from(impulse)));
+            }
         }
         self.touching.clear();
         self.touching.extend(near.iter().filter(|(_, touches)| *touches).map(|(other, _)| *other));
         (!near.is_empty(), began)
     }
+}
+
+/// What a collider stands for, as the number that rapier carries for us: walls are even, bodies odd.
+fn mark(struck: Struck) -> u128 {
+    match struck {
+        Struck::Wall(k) => 2 * k as u128,
+        Struck::Body(k) => 2 * k as u128 + 1,
+    }
+}
+
+/// The inverse of [`mark`].
+fn struck(mark: u128) -> Struck {
+    let k = (mark / 2) as usize;
+    if mark.is_multiple_of(2) { Struck::Wall(k) } else { Struck::Body(k) }
 }
 
 /// Solid walls: a triangle behind each edge of the room, its apex outside. Triangles have no overhang, so with an apex close

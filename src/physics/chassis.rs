@@ -6,8 +6,10 @@
 //! second is as stable as a skid. [`Chassis::drift`] moves with the mean of the velocities before and after, which is exact
 //! for constant deceleration.
 //!
-//! Loads follow from the centre of gravity, statically: the caster carries cog/caster of the weight, the wheels the rest in
-//! equal parts. Load transfer is left out; at the accelerations that an indoor robot's motors command it is a few per cent.
+//! Loads follow from the centre of gravity: the caster carries cog/caster of the weight, the wheels the rest in equal parts.
+//! Where the height of the centre of gravity is given, the floor's forces shift load: with acceleration (a_x, a_y) in the
+//! body's frame the caster carries m a_x h/caster less, and m a_y h/track moves from the left wheel to the right one. Loads
+//! follow that with a lag of [`LOAD_LAG_S`], which stands for what tyres and suspension do, and never fall below zero.
 
 use super::contact::{InverseMass, friction_impulse};
 use super::motor::{WheelDrive, WheelSpec, WheelState, flushed};
@@ -21,6 +23,9 @@ pub const STANDARD_GRAVITY_M_S2: f64 = 9.81;
 const MAX_SWEEPS: usize = 50;
 /// A sweep that changes no impulse by more than this share of its friction limit is the last.
 const CONVERGED: f64 = 1e-9;
+
+/// Time constant of load transfer, s.
+const LOAD_LAG_S: f64 = 0.01;
 
 /// Velocity of the centre of gravity in the room's frame, m/s, and yaw rate, rad/s.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -38,6 +43,8 @@ struct Foot {
     place: Vector2<f64>,
     /// Load, N.
     load: f64,
+    /// Load of the robot at rest, N.
+    rest_load: f64,
     /// Friction as a share of the floor's.
     friction_share: f64,
     /// Friction impulse of the last substep in the body's frame, N s: where the next search starts.
@@ -55,16 +62,22 @@ pub struct Chassis {
     yaw_inertia: f64,
     inertia: Inertia,
     cog_ahead: f64,
+    cog_height: f64,
+    rolling_resistance: f64,
     creep: f64,
     feet: [Foot; 3],
     wheels: [WheelSpec; 2],
     wheel_states: [WheelState; 2],
     /// Slip at the wheels' contacts after the last kick, body frame, m/s.
     slip: [Vector2<f64>; 2],
+    /// Force of the floor on each foot during the last kick, body frame, N.
+    forces: [Vector2<f64>; 3],
     /// Position of the centre of gravity, m.
     position: Vector2<f64>,
     /// Heading, rad, not wrapped.
     heading: f64,
+    /// Angle turned since the start, rad.
+    turned: f64,
     velocity: PlanarVelocity,
     /// Velocity before the last kick.
     velocity_before: PlanarVelocity,
@@ -84,6 +97,7 @@ impl Chassis {
             Foot {
                 place,
                 load: weight * share,
+                rest_load: weight * share,
                 friction_share,
                 impulse: Vector2::zeros(),
                 lambda: 0.0,
@@ -97,6 +111,8 @@ impl Chassis {
             yaw_inertia,
             inertia,
             cog_ahead: cog,
+            cog_height: robot.centre_of_gravity_height_m,
+            rolling_resistance: robot.rolling_resistance,
             creep: robot.creep_m_s,
             feet: [
                 foot(0.0, half_track, wheel_share, 1.0),
@@ -106,8 +122,10 @@ impl Chassis {
             wheels: robot.wheel_radius_error.map(|error| WheelSpec::new(robot, robot.wheel_radius_m * (1.0 + error))),
             wheel_states: Default::default(),
             slip: [Vector2::zeros(); 2],
+            forces: [Vector2::zeros(); 3],
             position: start.transform(Vector2::new(cog, 0.0)),
             heading: start.heading,
+            turned: 0.0,
             velocity: PlanarVelocity::default(),
             velocity_before: PlanarVelocity::default(),
         }
@@ -171,6 +189,38 @@ impl Chassis {
         self.slip
     }
 
+    /// Force (forward, leftward) of the floor on the left wheel, the right wheel and the caster in the last substep, N; never
+    /// more than friction times [load](Self::loads).
+    #[must_use]
+    pub fn forces(&self) -> [Vector2<f64>; 3] {
+        self.forces
+    }
+
+    /// Load on the left wheel, the right wheel and the caster, N.
+    #[must_use]
+    pub fn loads(&self) -> [f64; 3] {
+        [self.feet[0].load, self.feet[1].load, self.feet[2].load]
+    }
+
+    /// Changes the tyre of wheel `k` (0 left, 1 right): its friction and its radius become these shares of what they are.
+    pub fn wear_tyre(&mut self, k: usize, friction_factor: f64, radius_factor: f64) {
+        self.feet[k].friction_share *= friction_factor;
+        self.wheels[k].radius_m *= radius_factor;
+    }
+
+    /// Sets the robot down at rest with the middle of its axle at `pose`; the wheels turn on as they did.
+    pub fn place(&mut self, pose: Pose) {
+        self.position = pose.transform(Vector2::new(self.cog_ahead, 0.0));
+        self.heading = pose.heading;
+        self.set_velocity(PlanarVelocity::default());
+    }
+
+    /// Mass, kg.
+    #[must_use]
+    pub fn mass(&self) -> f64 {
+        self.mass
+    }
+
     /// Yaw inertia about the centre of gravity, kg m^2.
     #[must_use]
     pub fn yaw_inertia(&self) -> f64 {
@@ -194,15 +244,20 @@ impl Chassis {
     /// Finds the velocities after `dt` seconds under motors and friction. `friction` is the floor's coefficient at a point
     /// of the room.
     pub fn kick(&mut self, drives: [WheelDrive; 2], friction: impl Fn(Vector2<f64>) -> f64, dt: f64) {
+        if self.cog_height > 0.0 {
+            self.shift_load(dt);
+        }
         // Contacts as they will stand at the end of the substep, where the friction law has to hold.
         let heading = self.heading + self.velocity.yaw_rate * dt;
         let (sin, cos) = sin_cos(heading);
         let to_room = |v: Vector2<f64>| Vector2::new(cos * v.x - sin * v.y, sin * v.x + cos * v.y);
         let ahead = self.position + self.velocity.linear * dt;
 
+        let resistance: [f64; 2] =
+            std::array::from_fn(|k| self.rolling_resistance * self.feet[k].load * self.wheels[k].radius_m * dt);
         let respond = |k: usize, along: f64| {
             let wheel = &self.wheels[k];
-            let r = wheel.respond(&self.wheel_states[k], drives[k], along * wheel.radius_m, dt);
+            let r = wheel.respond(&self.wheel_states[k], drives[k], along * wheel.radius_m, resistance[k], dt);
             (r.speed * wheel.radius_m, r.inverse_inertia * wheel.radius_m * wheel.radius_m)
         };
         // Slip at contact k of a body that moves so, under the impulse `along` the wheel; and the wheel's inverse mass there.
@@ -262,24 +317,53 @@ impl Chassis {
             self.slip[k] = Vector2::new(over_ground.x - rolling[k], over_ground.y).map(flushed);
             self.wheels[k].finish(&mut self.wheel_states[k], drives[k], rolling[k] / self.wheels[k].radius_m, dt);
         }
-        for foot in &mut self.feet {
+        for (foot, force) in self.feet.iter_mut().zip(&mut self.forces) {
             foot.impulse = foot.impulse.map(flushed);
+            *force = foot.impulse / dt;
         }
         self.velocity_before = self.velocity;
         self.velocity = PlanarVelocity { linear: to_room(motion.linear.map(flushed)), yaw_rate: flushed(motion.yaw_rate) };
     }
 
+    /// Moves loads towards what the last substep's forces ask for.
+    fn shift_load(&mut self, dt: f64) {
+        let force: Vector2<f64> = self.forces.iter().sum();
+        let [left, right, caster] = &self.feet;
+        let weight = left.rest_load + right.rest_load + caster.rest_load;
+        let arm = caster.place.x - left.place.x; // from the axle to the caster
+        let leaves_caster = if arm == 0.0 { 0.0 } else { force.x * self.cog_height / arm };
+        let on_caster = (caster.rest_load - leaves_caster).clamp(0.0, weight);
+        let on_wheels = weight - on_caster;
+        let track = left.place.y - right.place.y;
+        let aside = (force.y * self.cog_height / track).clamp(-0.5 * on_wheels, 0.5 * on_wheels);
+        let wanted = [0.5 * on_wheels - aside, 0.5 * on_wheels + aside, on_caster];
+        for (foot, wanted) in self.feet.iter_mut().zip(wanted) {
+            foot.load += (wanted - foot.load) * (dt / (dt + LOAD_LAG_S));
+        }
+    }
+
     /// Moves for `dt` seconds with the mean of the velocities before and after the last kick.
     pub fn drift(&mut self, dt: f64) {
         self.position += (self.velocity_before.linear + self.velocity.linear) * (0.5 * dt);
-        self.heading += 0.5 * (self.velocity_before.yaw_rate + self.velocity.yaw_rate) * dt;
+        self.turn_by(0.5 * (self.velocity_before.yaw_rate + self.velocity.yaw_rate) * dt);
+    }
+
+    /// Angle that the robot has turned since the start, rad; being set down elsewhere is no turn.
+    #[must_use]
+    pub fn turned(&self) -> f64 {
+        self.turned
+    }
+
+    fn turn_by(&mut self, angle: f64) {
+        self.heading += angle;
+        self.turned += angle;
     }
 
     /// Takes over what contact with a wall or body made of the substep: the displacement of the axle's middle, the change of
     /// heading, and the velocity.
     pub fn adopt(&mut self, displacement: Vector2<f64>, turn: f64, velocity: PlanarVelocity) {
         let axle = self.pose().position() + displacement;
-        self.heading += turn;
+        self.turn_by(turn);
         let (s, c) = sin_cos(self.heading);
         self.position = axle + Vector2::new(c, s) * self.cog_ahead;
         self.velocity = velocity;

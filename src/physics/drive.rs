@@ -80,6 +80,8 @@ pub(super) struct Encoders {
     phase: [f64; 2],
     /// Whole counts at the last reading.
     counts: [f64; 2],
+    /// Which encoders count nothing.
+    dead: [bool; 2],
 }
 
 impl Encoders {
@@ -93,7 +95,13 @@ impl Encoders {
             track: robot.track_m,
             phase,
             counts: [0.0; 2],
+            dead: [false; 2],
         }
+    }
+
+    /// From now on encoder `k` counts nothing.
+    pub(super) fn kill(&mut self, k: usize) {
+        self.dead[k] = true;
     }
 
     /// Odometry since the last reading, `dt_s` ago, of wheels that have turned by `angles` (rad) since the start. The part of
@@ -102,7 +110,7 @@ impl Encoders {
         let mut travel = [0.0; 2];
         for k in 0..2 {
             let counts = libm::floor(angles[k] * self.counts_per_radian + self.phase[k]);
-            travel[k] = (counts - self.counts[k]) * self.travel_per_count;
+            travel[k] = if self.dead[k] { 0.0 } else { (counts - self.counts[k]) * self.travel_per_count };
             self.counts[k] = counts;
         }
         let [left, right] = travel;

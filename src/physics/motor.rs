@@ -3,6 +3,9 @@
 //! The motor follows the linear torque-speed line, torque = stall (u - speed / no_load), with u the share of full voltage,
 //! -1 to 1. The speed loop sets u = k_p (reference - speed) + k_i integral of it. Both are taken at the end of the substep:
 //! a light wheel that loses the floor would oscillate under the same gains taken at its start.
+//!
+//! Rolling resistance is dry friction on the wheel's turning: a torque of c N R against it, and as much as it takes, up to
+//! that, to keep a standing wheel standing.
 
 use crate::world::RobotSpec;
 
@@ -60,8 +63,26 @@ impl WheelSpec {
         }
     }
 
-    /// The wheel after `dt` seconds in which the floor turned it back by `floor` (angular impulse, N m s).
-    pub(super) fn respond(&self, state: &WheelState, drive: WheelDrive, floor: f64, dt: f64) -> Response {
+    /// The wheel after `dt` seconds in which the floor turned it back by `floor` and rolling resistance took up to
+    /// `resistance` (angular impulses, N m s).
+    pub(super) fn respond(&self, state: &WheelState, drive: WheelDrive, floor: f64, resistance: f64, dt: f64) -> Response {
+        if resistance == 0.0 {
+            return self.turn(state, drive, floor, dt);
+        }
+        // Speed falls as the angular impulse grows, so at most one of these holds.
+        let forwards = self.turn(state, drive, floor + resistance, dt);
+        if forwards.speed > 0.0 {
+            return forwards;
+        }
+        let backwards = self.turn(state, drive, floor - resistance, dt);
+        if backwards.speed < 0.0 {
+            return backwards;
+        }
+        Response { speed: 0.0, inverse_inertia: 0.0 }
+    }
+
+    /// The wheel after `dt` seconds in which everything but the motor turned it back by `floor` (angular impulse, N m s).
+    fn turn(&self, state: &WheelState, drive: WheelDrive, floor: f64, dt: f64) -> Response {
         let momentum = self.inertia_kg_m2 * state.speed - floor;
         match drive {
             WheelDrive::Locked => Response { speed: 0.0, inverse_inertia: 0.0 },

@@ -83,6 +83,7 @@ impl Movers {
                     };
                     (*speed_m_s, route)
                 }
+                MotionSpec::Pushed { .. } => continue, // rapier's business
             };
             movers.push(Mover {
                 body: index,
@@ -99,6 +100,11 @@ impl Movers {
     /// Current pose of every body, in the order of `World::bodies`.
     pub(super) fn poses(&self) -> &[Pose] {
         &self.poses
+    }
+
+    /// Takes over where something pushed a body.
+    pub(super) fn place(&mut self, body: usize, pose: Pose) {
+        self.poses[body] = pose;
     }
 
     /// Moves all movers on by `dt` seconds.

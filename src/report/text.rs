@@ -3,7 +3,8 @@
 use std::fmt::Write;
 use std::path::Path;
 
-use crate::episode::{Outcome, Summary};
+use crate::episode::open_loop::DriveSummary;
+use crate::episode::{Outcome, PoseRecord, Summary};
 use crate::study::seeds::{SeedsSummary, Spread};
 
 /// One run.
@@ -68,6 +69,29 @@ pub fn run(summary: &Summary, folder: &Path) -> String {
     ));
     rows.push(("files", folder.display().to_string()));
     table(&headline, &rows)
+}
+
+/// An open-loop drive.
+#[must_use]
+pub fn drive(summary: &DriveSummary, folder: &Path) -> String {
+    let s = summary;
+    let pose = |p: &PoseRecord| format!("({:.3}, {:.3}) m, {:.1} deg", p.x_m, p.y_m, p.heading_rad.to_degrees());
+    let mut rows = vec![
+        ("start", pose(&s.start)),
+        ("end", pose(&s.end)),
+        ("end by odometry", pose(&s.odometry_end)),
+        (
+            "odometry drift",
+            format!("{}, {:.2} deg", centimetres(s.odometry_drift_m), s.odometry_heading_drift_rad.to_degrees()),
+        ),
+        ("greatest speed", format!("{:.3} m/s", s.greatest_speed_m_s)),
+        ("greatest slip", format!("{:.4} m/s, mean of a control step", s.greatest_slip_m_s)),
+    ];
+    for hit in &s.collision_list {
+        rows.push(("collision", format!("{:.3} s, {}, {:.3} N s", hit.time_s, hit.with, hit.impulse_n_s)));
+    }
+    rows.push(("files", folder.display().to_string()));
+    table(&format!("drove {:.2} m in {:.1} s", s.path_length_m, s.time_s), &rows)
 }
 
 /// A batch.

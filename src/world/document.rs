@@ -56,7 +56,7 @@ impl Node {
     }
 
     /// A tree from anything that serialises; non-finite numbers survive, which JSON has no way to write.
-    pub(super) fn from_spec(spec: &super::WorldSpec) -> std::result::Result<Self, toml::ser::Error> {
+    pub(super) fn from_spec(spec: &impl serde::Serialize) -> std::result::Result<Self, toml::ser::Error> {
         fn convert(value: toml::Value) -> Node {
             let value = match value {
                 toml::Value::String(s) => Value::Text(s),
@@ -116,7 +116,20 @@ impl Node {
         }
     }
 
-    fn text(&self) -> Option<&str> {
+    /// Adds to the table at `key`, if there is one, the entries of `defaults` that it does not have.
+    pub(super) fn fill(&mut self, key: &str, defaults: Self) {
+        let (Value::Table(entries), Value::Table(defaults)) = (&mut self.value, defaults.value) else { return };
+        let entry = entries.iter_mut().find(|(k, _)| k == key).map(|(_, node)| &mut node.value);
+        if let Some(Value::Table(entries)) = entry {
+            for (key, value) in defaults {
+                if !entries.iter().any(|(k, _)| *k == key) {
+                    entries.push((key, value));
+                }
+            }
+        }
+    }
+
+    pub(super) fn text(&self) -> Option<&str> {
         match &self.value {
             Value::Text(text) => Some(text),
             _ => None,

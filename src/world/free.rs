@@ -26,13 +26,14 @@ impl World {
         self.first_in_the_way(&disc, self.bodies.iter().zip(body_poses))
     }
 
-    /// Whether the robot can drive straight from `from` to `to`, past walls and standing bodies. Moving bodies don't count.
+    /// Whether the robot can drive straight from `from` to `to`, past walls and standing bodies, those that could be pushed away
+    /// included. Bodies that move by themselves don't count.
     ///
     /// # Errors
     /// What is in the way, in words.
     pub fn is_corridor_free(&self, from: Vector2<f64>, to: Vector2<f64>) -> std::result::Result<(), String> {
         let corridor = Convex::corridor(from, to, self.spec.robot.radius_m);
-        let standing = self.bodies.iter().filter(|b| b.motion.is_none());
+        let standing = self.bodies.iter().filter(|b| b.stands());
         self.first_in_the_way(&corridor, standing.map(|b| (b, &b.pose)))
     }
 

@@ -7,6 +7,7 @@ use sha2::{Digest, Sha256};
 
 use super::document::Node;
 use super::polygon::anticlockwise;
+use super::robot::{RobotPreset, RobotSpec};
 use super::spec::{ShapeSpec, TextureSpec, WorldSpec};
 use super::structure::{self, Findings};
 use super::validate;
@@ -106,6 +107,12 @@ impl World {
         let Findings { unknown, not_finite, unreadable } = structure::check(&mut tree, &Self::json_schema());
         let mut faults = unknown;
         if unreadable.is_empty() {
+            if let Some(preset) = tree.get("robot").and_then(|robot| robot.get("preset")).cloned() {
+                let parse_error = |message: String| Error::Parse { path: path.to_owned(), message };
+                let preset = RobotPreset::deserialize(preset).map_err(|e| parse_error(e.to_string()))?;
+                let robot = Node::from_spec(&RobotSpec::of(preset)).map_err(|e| parse_error(e.to_string()))?;
+                tree.fill("robot", robot);
+            }
             let spec =
                 WorldSpec::deserialize(tree).map_err(|e| Error::Parse { path: path.to_owned(), message: e.to_string() })?;
             faults.extend(validate::check(&spec, &not_finite));

@@ -10,6 +10,7 @@ mod document;
 mod free;
 mod load;
 pub mod polygon;
+pub mod robot;
 pub mod spec;
 mod structure;
 mod validate;
@@ -18,7 +19,8 @@ use std::path::PathBuf;
 
 use crate::geometry::{Pose, Vector2};
 use crate::panorama::{INSTANCE_FIRST_WALL, Projection};
-pub use spec::{MotionSpec, RobotSpec, TaskSpec, TextureFamily, TextureSpec, WorldSpec};
+pub use robot::RobotSpec;
+pub use spec::{MotionSpec, TaskSpec, TextureFamily, TextureSpec, WorldSpec};
 
 /// One fault of a world file.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -103,6 +105,14 @@ pub struct Body {
     pub motion: Option<MotionSpec>,
     /// Instance id in panoramas.
     pub instance: u16,
+}
+
+impl Body {
+    /// Whether it stands where it is unless something pushes it.
+    #[must_use]
+    pub fn stands(&self) -> bool {
+        matches!(self.motion, None | Some(MotionSpec::Pushed { .. }))
+    }
 }
 
 /// A floor zone of a checked world.

@@ -87,7 +87,7 @@ impl MapDrawing {
 
     fn draw_way(&mut self, body: &Body) {
         let mut corners = match &body.motion {
-            None => return,
+            None | Some(MotionSpec::Pushed { .. }) => return,
             Some(MotionSpec::Path { corners_m, closed, .. }) => {
                 let start = body.pose.position();
                 let mut corners = vec![start];

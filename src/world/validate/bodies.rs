@@ -91,6 +91,12 @@ fn check_body(place: &str, body: &BodySpec, spec: &WorldSpec, faults: &mut Fault
             faults.polygon(&format!("{place}.motion.walk.region_m"), region_m, false);
             faults.positive(format!("{place}.motion.walk.speed_m_s"), *speed_m_s, 10.0);
         }
+        Some(MotionSpec::Pushed { mass_kg, friction }) => {
+            faults.positive(format!("{place}.motion.pushed.mass_kg"), *mass_kg, 1e4);
+            faults.between(format!("{place}.motion.pushed.friction"), *friction, 0.0, 10.0);
+            let allowed = "0 for a body that can be pushed: it stands on the floor";
+            faults.unless(body.elevation_m == 0.0, format!("{place}.elevation_m"), body.elevation_m.to_string(), allowed);
+        }
     }
 }
 
@@ -136,7 +142,7 @@ fn check_motion(world: &World, body: &Body, place: &str, faults: &mut Faults) {
         Footprint::Disc(radius_m) => *radius_m,
         Footprint::Polygon(corners) => corners.iter().map(|c| c.dot(c).sqrt()).fold(0.0, f64::max),
     };
-    let standing: Vec<_> = world.bodies.iter().filter(|b| b.motion.is_none() && at_same_height(b, body)).collect();
+    let standing: Vec<_> = world.bodies.iter().filter(|b| b.stands() && at_same_height(b, body)).collect();
     let in_the_way = |a, b| {
         let swept = Convex::corridor(a, b, reach_m);
         if gap_to_walls_m(&world.outline, &swept) < -TOLERANCE_M {
@@ -146,7 +152,7 @@ fn check_motion(world: &World, body: &Body, place: &str, faults: &mut Faults) {
         hit.map(|b| format!("\"{}\"", b.name))
     };
     match &body.motion {
-        None => {}
+        None | Some(MotionSpec::Pushed { .. }) => {}
         Some(MotionSpec::Path { corners_m, closed, .. }) => {
             let mut at = body.pose.position();
             let start = at;

@@ -33,6 +33,7 @@ pub(super) fn check(spec: &WorldSpec, known: &[WorldFault]) -> Vec<WorldFault> {
     bodies::check_values(spec, &mut faults);
     robot::check(spec, &mut faults);
     starts::check_values(spec, &mut faults);
+    starts::check_disturbances(spec, &mut faults);
     if faults.touch("room.outline_m") || spec.room.walls.is_empty() {
         return faults.found; // without a room nothing has a place
     }

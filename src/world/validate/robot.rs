@@ -2,10 +2,12 @@
 
 use super::{Faults, GREATEST_M};
 use crate::world::WorldSpec;
+use crate::world::robot::WheelFault;
 
 pub(super) fn check(spec: &WorldSpec, faults: &mut Faults) {
     check_body(spec, faults);
     check_drive(spec, faults);
+    check_gyro_and_faults(spec, faults);
     check_camera(spec, faults);
     check_task(spec, faults);
 }
@@ -17,6 +19,14 @@ fn check_body(spec: &WorldSpec, faults: &mut Faults) {
     faults.between("robot.height_m", r.height_m, 0.01, 100.0);
     if let Some(inertia) = r.yaw_inertia_kg_m2 {
         faults.positive("robot.yaw_inertia_kg_m2", inertia, 1e7);
+    }
+    if !faults.touch("robot.height_m") {
+        faults.unless(
+            r.centre_of_gravity_height_m >= 0.0 && r.centre_of_gravity_height_m <= r.height_m,
+            "robot.centre_of_gravity_height_m",
+            r.centre_of_gravity_height_m.to_string(),
+            format!("0 (no load transfer) to {} (height_m)", r.height_m),
+        );
     }
     if !faults.touch("robot.height_m") && !faults.touch("room.height_m") && r.height_m >= spec.room.height_m {
         let allowed = format!("less than the room's height, {}", spec.room.height_m);
@@ -59,6 +69,7 @@ fn check_body(spec: &WorldSpec, faults: &mut Faults) {
 fn check_drive(spec: &WorldSpec, faults: &mut Faults) {
     let r = &spec.robot;
     faults.positive("robot.wheel_inertia_kg_m2", r.wheel_inertia_kg_m2, 1e4);
+    faults.between("robot.rolling_resistance", r.rolling_resistance, 0.0, 0.5);
     faults.between("robot.caster_friction", r.caster_friction, 0.0, 10.0);
     faults.positive("robot.creep_m_s", r.creep_m_s, 1.0);
     faults.positive("robot.stall_torque_n_m", r.stall_torque_n_m, 1e5);
@@ -77,6 +88,21 @@ fn check_drive(spec: &WorldSpec, faults: &mut Faults) {
     if ![&speed, &no_load, &wheel].iter().any(|place| faults.touch(place)) && r.max_speed_m_s > top {
         let allowed = format!("at most {top:.4}, what the unloaded motor reaches (no_load_speed_rad_s times wheel_radius_m)");
         faults.add(speed, r.max_speed_m_s.to_string(), allowed);
+    }
+}
+
+fn check_gyro_and_faults(spec: &WorldSpec, faults: &mut Faults) {
+    if let Some(gyro) = &spec.robot.gyro {
+        faults.between("robot.gyro.bias_sd_rad_s", gyro.bias_sd_rad_s, 0.0, 10.0);
+        faults.between("robot.gyro.noise_rad_s_sqrt_hz", gyro.noise_rad_s_sqrt_hz, 0.0, 10.0);
+    }
+    for (k, fault) in spec.robot.faults.iter().enumerate() {
+        let place = format!("robot.faults[{k}]");
+        faults.between(format!("{place}.from_s"), fault.from_s, 0.0, 1e6);
+        if let WheelFault::WornTyre { friction_factor, radius_factor } = fault.what {
+            faults.between(format!("{place}.what.worn-tyre.friction_factor"), friction_factor, 0.0, 10.0);
+            faults.between(format!("{place}.what.worn-tyre.radius_factor"), radius_factor, 0.5, 1.5);
+        }
     }
 }
 

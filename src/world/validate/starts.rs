@@ -4,6 +4,7 @@ use super::room::polygon_inside;
 use super::{Faults, GREATEST_M, TOLERANCE_M};
 use crate::geometry::Pose;
 use crate::world::polygon::anticlockwise;
+use crate::world::spec::DisturbanceKind;
 use crate::world::{World, WorldSpec};
 
 pub(super) fn check_values(spec: &WorldSpec, faults: &mut Faults) {
@@ -34,6 +35,22 @@ pub(super) fn check_values(spec: &WorldSpec, faults: &mut Faults) {
     faults.distinct(start.named.iter().enumerate().map(|(k, n)| (format!("start.named[{k}]"), n.name.as_str())));
 }
 
+pub(super) fn check_disturbances(spec: &WorldSpec, faults: &mut Faults) {
+    for (k, disturbance) in spec.disturbances.iter().enumerate() {
+        let place = format!("disturbances[{k}]");
+        faults.between(format!("{place}.at_s"), disturbance.at_s, 0.0, 1e6);
+        match disturbance.what {
+            DisturbanceKind::Kick { impulse_n_s, turn_n_m_s } => {
+                for (axis, impulse) in impulse_n_s.into_iter().enumerate() {
+                    faults.between(format!("{place}.what.kick.impulse_n_s[{axis}]"), impulse, -1e4, 1e4);
+                }
+                faults.between(format!("{place}.what.kick.turn_n_m_s"), turn_n_m_s, -1e4, 1e4);
+            }
+            DisturbanceKind::Kidnap(to) => pose(&format!("{place}.what.kidnap"), to.x_m, to.y_m, to.heading_deg, faults),
+        }
+    }
+}
+
 fn pose(place: &str, x: f64, y: f64, heading_deg: f64, faults: &mut Faults) {
     faults.between(format!("{place}.x_m"), x, -GREATEST_M, GREATEST_M);
     faults.between(format!("{place}.y_m"), y, -GREATEST_M, GREATEST_M);
@@ -51,8 +68,13 @@ pub(super) fn check_places(world: &World, faults: &mut Faults) {
     }
     let named = world.spec.start.named.iter().enumerate();
     let named = named.map(|(k, n)| (format!("start.named[{k}]"), Pose::new(n.x_m, n.y_m, 0.0)));
+    let disturbances = world.spec.disturbances.iter().enumerate();
+    let kidnapped = disturbances.filter_map(|(k, d)| match d.what {
+        DisturbanceKind::Kidnap(to) => Some((format!("disturbances[{k}].what.kidnap"), Pose::new(to.x_m, to.y_m, 0.0))),
+        DisturbanceKind::Kick { .. } => None,
+    });
     let bodies = world.body_poses();
-    for (place, pose) in std::iter::once(("home".to_owned(), world.home)).chain(named) {
+    for (place, pose) in std::iter::once(("home".to_owned(), world.home)).chain(named).chain(kidnapped) {
         if ["x_m", "y_m"].iter().any(|field| faults.touch(&format!("{place}.{field}"))) {
             continue;
         }
