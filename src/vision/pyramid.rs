@@ -77,6 +77,7 @@ pub(super) struct Octave {
     pub gauss: [Image<u16>; 3],
     /// Differences of neighbouring Gaussian images.
     pub difference: [Image<i16>; 2],
+    scratch: Image<u16>,
     /// Panorama columns per column of this octave. 2^octave but where a width was odd.
     pub step_x: f32,
     /// Panorama rows per row of this octave.
@@ -88,7 +89,6 @@ pub(super) struct Octave {
 pub(super) struct Pyramid {
     pub octaves: Vec<Octave>,
     luma: Image<u16>,
-    scratch: Image<u16>,
     line: Vec<u16>,
 }
 
@@ -120,8 +120,8 @@ impl Pyramid {
             }
             let [g0, g1, g2] = &mut octave.gauss;
             blur(g0, g1, &mut self.line);
-            blur(g1, &mut self.scratch, &mut self.line);
-            blur(&self.scratch, g2, &mut self.line);
+            blur(g1, &mut octave.scratch, &mut self.line);
+            blur(&octave.scratch, g2, &mut self.line);
             subtract(g1, g0, &mut octave.difference[0]);
             subtract(g2, g1, &mut octave.difference[1]);
         }
