@@ -6,15 +6,19 @@
 mod columns;
 mod cpu;
 mod frame;
+mod gpu;
+mod hits;
+mod sample;
 mod scene;
 mod shade;
 mod texture;
 
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::geometry::Pose;
 use crate::panorama::{Panorama, Projection};
 
 pub use cpu::CpuRenderer;
+pub use gpu::{GpuRenderer, SHADER};
 pub use scene::Scene;
 
 /// Which renderer a person asks for.
@@ -65,8 +69,21 @@ pub trait Renderer: Send {
 /// The renderer of a person's choice.
 ///
 /// # Errors
-/// [`crate::Error::NoAdapter`] where the GPU is asked for and there is no adapter.
+/// [`Error::NoAdapter`] where the GPU is asked for and there is none, [`Error::Gpu`] where it cannot be used.
 pub fn create(choice: RendererChoice) -> Result<Box<dyn Renderer>> {
-    let _ = choice;
-    Ok(Box::new(CpuRenderer::new()))
+    match choice {
+        RendererChoice::Cpu => Ok(Box::new(CpuRenderer::new())),
+        RendererChoice::Gpu => Ok(Box::new(GpuRenderer::new()?)),
+        RendererChoice::Auto => match GpuRenderer::on_hardware() {
+            Ok(renderer) => Ok(Box::new(renderer)),
+            Err(Error::NoAdapter(why)) => {
+                log::debug!("rendering on the CPU: no hardware adapter ({why})");
+                Ok(Box::new(CpuRenderer::new()))
+            }
+            Err(error) => {
+                log::warn!("rendering on the CPU: {error}");
+                Ok(Box::new(CpuRenderer::new()))
+            }
+        },
+    }
 }

@@ -129,22 +129,28 @@ impl Canvas {
                 [0; 3].map(|_| strength * ((1.0 - tint) * grey + tint * between(stream, -1.0, 1.0) as f32))
             })
             .collect();
-        let place = |x: f64, cell: f64, n: usize| {
-            let at = x / cell;
+        let scale = self.scale();
+        let place = |k: usize, cell: f64, n: usize| {
+            let at = (k as f64 + 0.5) / (scale * cell);
             let k = at as usize;
             let f = at - k as f64;
             (k % n, (k + 1) % n, (f * f * (3.0 - 2.0 * f)) as f32)
         };
-        self.each(|u, v, c| {
-            let (a, b, fu) = place(u, cell_u, nu);
-            let (p, q, fv) = place(v, cell_v, nv);
-            for (k, x) in c.iter_mut().enumerate() {
-                let at = |u: usize, v: usize| lattice[u * nv + v][k];
-                let low = at(a, p) + (at(b, p) - at(a, p)) * fu;
-                let high = at(a, q) + (at(b, q) - at(a, q)) * fu;
-                *x += low + (high - low) * fv;
+        let along_v: Vec<_> = (0..self.size).map(|k| place(k, cell_v, nv)).collect();
+        let mut between_lines = vec![[0.0; 3]; nv];
+        for (k, line) in self.pixels.chunks_mut(self.size).enumerate() {
+            let (a, b, f) = place(k, cell_u, nu);
+            for (v, value) in between_lines.iter_mut().enumerate() {
+                let (a, b) = (lattice[a * nv + v], lattice[b * nv + v]);
+                *value = std::array::from_fn(|c| a[c] + (b[c] - a[c]) * f);
             }
-        });
+            for (pixel, &(p, q, f)) in line.iter_mut().zip(&along_v) {
+                let (p, q) = (between_lines[p], between_lines[q]);
+                for c in 0..3 {
+                    pixel[c] += p[c] + (q[c] - p[c]) * f;
+                }
+            }
+        }
     }
 
     /// Draws the pattern back towards the base colour: 1 leaves it, 0 removes it.
