@@ -7,7 +7,7 @@ use std::sync::LazyLock;
 
 use wayhome::geometry::{Pose, angle_of, direction, wrap};
 use wayhome::observation::Bearing;
-use wayhome::panorama::Panorama;
+use wayhome::panorama::{Panorama, Projection};
 use wayhome::render::{self, RendererChoice, Scene, View};
 use wayhome::vision::{Extractor, ExtractorSettings, Match};
 use wayhome::world::World;
@@ -31,7 +31,10 @@ impl Studio {
     }
 
     fn take(&self, robot: Pose) -> Panorama {
-        let projection = self.world.projection();
+        self.take_as(self.world.projection(), robot)
+    }
+
+    fn take_as(&self, projection: Projection, robot: Pose) -> Panorama {
         let bodies = self.world.body_poses();
         let mut panorama = Panorama::black(projection);
         let mut renderer = render::create(RendererChoice::Cpu).expect("there is a processor");
@@ -242,6 +245,23 @@ fn another_place_yields_no_bearings() {
         found.iter().filter(|n| **n == 0).count() >= 7 && found.iter().all(|n| *n < 25),
         "landmarks in another place: {found:?}"
     );
+}
+
+/// Widths that do not halve evenly, a camera that is mounted askew, another size at home than now.
+#[test]
+fn odd_cameras_see_landmarks_too() {
+    let home_pose = LAB.world.home;
+    let pose = Pose::new(home_pose.x + 0.3, home_pose.y + 0.4, 1.0);
+    let odd = Projection { mount_rad: 0.4, ..LAB.world.projection_of_size(561, 81) };
+    let large = LAB.world.projection_of_size(845, 131);
+    for (at_home, later, least) in [(odd, odd, 250), (large, odd, 100), (odd, large, 100)] {
+        let (home, now) = (LAB.take_as(at_home, home_pose), LAB.take_as(later, pose));
+        let mut extractor = Extractor::new(ExtractorSettings::default(), &home);
+        extractor.observe(&now);
+        let mut score = Score::default();
+        score.add(extractor.matches(), &home, home_pose, &now, pose);
+        assert!(score.right >= least && score.precision() > 0.95, "{} of {}", score.right, score.matches);
+    }
 }
 
 #[test]

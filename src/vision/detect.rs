@@ -147,6 +147,7 @@ impl Scratch {
         self.high.resize(width + 2, 0);
         self.low.resize(width + 2, 0);
         self.mask.resize(width.next_multiple_of(8), 0);
+        self.mask[width..].fill(0);
         // Extremes of each column's three pixels, with a copy of the other end on either side.
         let columns = above.iter().zip(row).zip(below);
         for ((high, low), ((a, b), c)) in self.high[1..=width].iter_mut().zip(&mut self.low[1..=width]).zip(columns) {
