@@ -7,7 +7,7 @@ use std::sync::LazyLock;
 
 use wayhome::geometry::{Pose, angle_of, direction, wrap};
 use wayhome::observation::Bearing;
-use wayhome::panorama::Panorama;
+use wayhome::panorama::{Panorama, Projection};
 use wayhome::render::{self, RendererChoice, Scene, View};
 use wayhome::vision::{Extractor, ExtractorSettings, Match};
 use wayhome::world::World;
@@ -31,7 +31,10 @@ impl Studio {
     }
 
     fn take(&self, robot: Pose) -> Panorama {
-        let projection = self.world.projection();
+        self.take_as(self.world.projection(), robot)
+    }
+
+    fn take_as(&self, projection: Projection, robot: Pose) -> Panorama {
         let bodies = self.world.body_poses();
         let mut panorama = Panorama::black(projection);
         let mut renderer = render::create(RendererChoice::Cpu).expect("there is a processor");
@@ -140,7 +143,7 @@ fn landmarks_are_found_again_metres_away() {
     println!("landmarks: {}", extractor.home_snapshot().bearings.len());
     // Distance, least right matches in any panorama, precision, median bearing error in degrees.
     for (distance_m, least, precision, median_deg) in
-        [(0.25, 380, 0.97, 0.04), (0.5, 340, 0.97, 0.05), (1.0, 270, 0.96, 0.06), (2.0, 150, 0.93, 0.08), (3.0, 100, 0.92, 0.1)]
+        [(0.25, 330, 0.98, 0.04), (0.5, 300, 0.98, 0.05), (1.0, 240, 0.97, 0.06), (2.0, 140, 0.95, 0.07), (3.0, 90, 0.93, 0.08)]
     {
         let mut score = Score::default();
         for pose in around(home_pose, distance_m).filter(Studio::is_free) {
@@ -178,7 +181,7 @@ fn a_pure_turn_is_recovered() {
         let found = extractor.observe(&now);
         let off = |b: &Bearing| azimuth_of(&snapshot, *b).map_or(f64::NAN, |home| wrap(b.azimuth_rad - home + turn).abs());
         let right = found.iter().filter(|b| off(b) < 0.5_f64.to_radians()).count();
-        assert!(found.len() > 400 && right as f64 > 0.98 * found.len() as f64, "turn {turn}: {right} of {}", found.len());
+        assert!(found.len() > 380 && right as f64 > 0.98 * found.len() as f64, "turn {turn}: {right} of {}", found.len());
     }
 }
 
@@ -242,6 +245,23 @@ fn another_place_yields_no_bearings() {
         found.iter().filter(|n| **n == 0).count() >= 7 && found.iter().all(|n| *n < 25),
         "landmarks in another place: {found:?}"
     );
+}
+
+/// Widths that do not halve evenly, a camera that is mounted askew, another size at home than now.
+#[test]
+fn odd_cameras_see_landmarks_too() {
+    let home_pose = LAB.world.home;
+    let pose = Pose::new(home_pose.x + 0.3, home_pose.y + 0.4, 1.0);
+    let odd = Projection { mount_rad: 0.4, ..LAB.world.projection_of_size(561, 81) };
+    let large = LAB.world.projection_of_size(845, 131);
+    for (at_home, later, least) in [(odd, odd, 250), (large, odd, 100), (odd, large, 100)] {
+        let (home, now) = (LAB.take_as(at_home, home_pose), LAB.take_as(later, pose));
+        let mut extractor = Extractor::new(ExtractorSettings::default(), &home);
+        extractor.observe(&now);
+        let mut score = Score::default();
+        score.add(extractor.matches(), &home, home_pose, &now, pose);
+        assert!(score.right >= least && score.precision() > 0.95, "{} of {}", score.right, score.matches);
+    }
 }
 
 #[test]

@@ -149,6 +149,7 @@ impl Scratch {
         // Buffers serve layers of all widths: what a wider one left behind the last column must not be found.
         self.mask.clear();
         self.mask.resize(width.next_multiple_of(8), 0);
+        self.mask[width..].fill(0);
         // Extremes of each column's three pixels, with a copy of the other end on either side.
         let columns = above.iter().zip(row).zip(below);
         for ((high, low), ((a, b), c)) in self.high[1..=width].iter_mut().zip(&mut self.low[1..=width]).zip(columns) {

@@ -109,63 +109,63 @@ impl Gallery {
     }
 }
 
+/// The features of one of the two panoramas.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct View<'a> {
+    pub features: &'a [Feature],
+    /// Columns of the panorama.
+    pub width: f32,
+}
+
+impl View<'_> {
+    /// Whether two features are the same blob, found twice.
+    fn same_place(&self, i: usize, j: usize) -> bool {
+        let (a, b) = (&self.features[i], &self.features[j]);
+        let near = a.sigma.min(b.sigma);
+        let apart = (a.x - b.x).abs();
+        apart.min(self.width - apart) < near && (a.y - b.y).abs() < near
+    }
+}
+
 /// Nearest neighbours both ways among the candidates that `allowed` lets pass, with a distance of at most `limit` and at most
 /// `max_ratio` times the runner-up's. Rivals at the same place (a blob found twice) do not count against a match. Sorted from
 /// the most to the least distinct.
 pub(super) fn choose(
     candidates: &[Candidate],
-    home: &[Feature],
-    now: &[Feature],
+    home: View<'_>,
+    now: View<'_>,
     limit: f32,
     max_ratio: f32,
     allowed: impl Fn(&Candidate) -> bool,
 ) -> Vec<Choice> {
-    let mut best_of_home: Vec<Option<Candidate>> = vec![None; home.len()];
-    let mut rows = Vec::new();
+    let mut best_of_home: Vec<Option<Candidate>> = vec![None; home.features.len()];
+    let mut choices = Vec::new();
+    let mut passed = Vec::new();
     for group in candidates.chunk_by(|a, b| a.now == b.now) {
-        let mut best: Option<Candidate> = None;
-        let mut kept = Vec::new();
-        for candidate in group.iter().filter(|c| allowed(c)) {
-            kept.push(*candidate);
-            if best.is_none_or(|b| candidate.distance < b.distance) {
-                best = Some(*candidate);
-            }
+        passed.clear();
+        passed.extend(group.iter().copied().filter(|c| allowed(c)));
+        for candidate in &passed {
             let rival = &mut best_of_home[candidate.home];
             if rival.is_none_or(|r| candidate.distance < r.distance) {
                 *rival = Some(*candidate);
             }
         }
-        let Some(best) = best else { continue };
-        let second = kept
-            .iter()
-            .filter(|c| !same_place(&home[c.home], &home[best.home]))
-            .map(|c| c.distance)
-            .fold(f32::INFINITY, f32::min);
-        rows.push((best, second));
+        let Some(best) = passed.iter().copied().min_by(|a, b| a.distance.total_cmp(&b.distance)) else { continue };
+        let others = passed.iter().filter(|c| !home.same_place(c.home, best.home));
+        let second = others.map(|c| c.distance).fold(f32::INFINITY, f32::min);
+        let choice = Choice { candidate: best, ratio: best.distance / second.max(1e-6) };
+        if best.distance <= limit && choice.ratio <= max_ratio {
+            choices.push(choice);
+        }
     }
-    let mut choices: Vec<_> = rows
-        .into_iter()
-        .map(|(candidate, second)| Choice { candidate, ratio: candidate.distance / second.max(1e-6) })
-        .filter(|c| c.candidate.distance <= limit && c.ratio <= max_ratio)
-        .filter(|c| {
-            best_of_home[c.candidate.home]
-                .is_some_and(|r| r.now == c.candidate.now || same_place(&now[r.now], &now[c.candidate.now]))
-        })
-        .collect();
-    // Each home feature once, the nearest first.
-    choices.sort_by(|a, b| {
-        a.candidate
-            .home
-            .cmp(&b.candidate.home)
-            .then(a.candidate.distance.total_cmp(&b.candidate.distance))
-            .then(a.candidate.now.cmp(&b.candidate.now))
+    choices.retain(|c| {
+        let best = best_of_home[c.candidate.home];
+        best.is_some_and(|b| b.now == c.candidate.now || now.same_place(b.now, c.candidate.now))
     });
+    // Each home feature once, with its nearest.
+    let by_distance = |a: &Candidate, b: &Candidate| a.distance.total_cmp(&b.distance).then(a.now.cmp(&b.now));
+    choices.sort_by(|a, b| a.candidate.home.cmp(&b.candidate.home).then_with(|| by_distance(&a.candidate, &b.candidate)));
     choices.dedup_by_key(|c| c.candidate.home);
     choices.sort_by(|a, b| a.ratio.total_cmp(&b.ratio).then(a.candidate.home.cmp(&b.candidate.home)));
     choices
-}
-
-fn same_place(a: &Feature, b: &Feature) -> bool {
-    let near = 1.0 * a.sigma.min(b.sigma);
-    (a.x - b.x).abs() < near && (a.y - b.y).abs() < near
 }

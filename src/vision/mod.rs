@@ -24,8 +24,8 @@ use crate::random::Seed;
 
 use describe::{Describer, Descriptor};
 use detect::{Criteria, Feature, Scratch};
-use matching::{Candidate, Choice, Gallery};
-use motion::{CHI2_LIMIT, Pair, Sight};
+use matching::{Candidate, Choice, Gallery, View};
+use motion::{Pair, PlanarMotion, Sight};
 use pyramid::Pyramid;
 
 /// Settings of the extractor. The defaults suit 1440 x 180 pixels.
@@ -227,57 +227,75 @@ impl Extractor {
     }
 
     fn look(&mut self, now: &Panorama) {
-        let settings = &self.settings;
-        let projection = now.projection;
         self.matches.clear();
+        self.find_features(now);
+        let choices = self.match_features(&now.projection);
+        if choices.len() < self.settings.least_matches {
+            return;
+        }
+        for Choice { candidate, .. } in choices {
+            let (home, seen) = (&self.home[candidate.home], &self.now[candidate.now]);
+            self.matches.push(Match {
+                id: LandmarkId(candidate.home as u32),
+                home_px: (f64::from(home.x), f64::from(home.y)),
+                now_px: (f64::from(seen.x), f64::from(seen.y)),
+                home_scale_px: f64::from(home.sigma),
+                now_scale_px: f64::from(seen.sigma),
+                distance: f64::from(candidate.distance),
+                home_sd_rad: sd_rad(home, 0.0, &self.home_projection, &self.settings),
+                now_sd_rad: sd_rad(seen, candidate.distance, &now.projection, &self.settings),
+            });
+        }
+        self.matches.sort_by_key(|m| m.id);
+    }
+
+    /// Features and descriptors of the current panorama.
+    fn find_features(&mut self, now: &Panorama) {
+        let settings = &self.settings;
         self.pyramid.build(now, settings.octaves);
         detect::detect(&self.pyramid, &self.criteria, &mut self.scratch, &mut self.now);
+        if self.now.len() < settings.features / 2 && self.criteria.contrast > settings.contrast {
+            // Far fewer than at home: a poorer view, or darker light.
+            let all = Criteria { contrast: settings.contrast, ..self.criteria };
+            detect::detect(&self.pyramid, &all, &mut self.scratch, &mut self.now);
+        }
         self.descriptors.clear();
         self.descriptors.extend(self.now.iter().map(|f| self.describer.describe(&self.pyramid, f, settings.cell, 1.0)));
+    }
+
+    /// Matches that fit one planar motion.
+    fn match_features(&mut self, projection: &Projection) -> Vec<Choice> {
+        let settings = &self.settings;
         self.gallery.compare(
             &self.now,
             &self.descriptors,
-            horizon(&projection),
+            horizon(projection),
             settings.height_slack,
-            1.15 * settings.distance,
+            RUNNER_UP * settings.distance,
             &mut self.candidates,
         );
-        let sights: Vec<Sight> = self.now.iter().map(|f| sight(f, &projection, settings)).collect();
-        let pair = |c: &Choice| Pair { home: self.home_sights[c.candidate.home], now: sights[c.candidate.now] };
-        let first = matching::choose(&self.candidates, &self.home, &self.now, settings.distance, settings.ratio, |_| true);
-        let pairs: Vec<Pair> = first.iter().map(pair).collect();
-        let Some(found) = motion::estimate(&pairs, settings.draws, Seed(settings.seed)) else { return };
-        // With the motion known, ambiguous matches are taken where they fit it; then once more with the motion of all.
-        let mut motion = found;
-        let mut chosen = Vec::new();
-        for _ in 0..2 {
+        let home = View { features: &self.home, width: self.home_projection.width as f32 };
+        let now = View { features: &self.now, width: projection.width as f32 };
+        let sights: Vec<Sight> = self.now.iter().map(|f| sight(f, projection, settings)).collect();
+        let pairs = |choices: &[Choice]| -> Vec<Pair> {
+            let pair = |c: &Choice| Pair { home: self.home_sights[c.candidate.home], now: sights[c.candidate.now] };
+            choices.iter().map(pair).collect()
+        };
+        let first = matching::choose(&self.candidates, home, now, settings.distance, settings.ratio, |_| true);
+        let Some(motion) = motion::estimate(&pairs(&first), settings.draws, Seed(settings.seed)) else { return Vec::new() };
+        // With the motion known, ambiguous matches are taken where they fit it; then once more with the motion of them all.
+        let guided = |motion: PlanarMotion| {
             let frame = motion.frame();
-            chosen = matching::choose(&self.candidates, &self.home, &self.now, settings.distance, settings.guided_ratio, |c| {
-                let fit = frame.fit(&self.home_sights[c.home], &sights[c.now]);
-                fit.possible && fit.chi2 < CHI2_LIMIT
-            });
-            let pairs: Vec<Pair> = chosen.iter().map(pair).collect();
-            motion = motion::polish(&pairs, motion);
-        }
-        if chosen.len() < settings.least_matches {
-            return;
-        }
-        chosen.sort_by_key(|c| c.candidate.home);
-        for choice in &chosen {
-            let (home, now) = (&self.home[choice.candidate.home], &self.now[choice.candidate.now]);
-            self.matches.push(Match {
-                id: LandmarkId(choice.candidate.home as u32),
-                home_px: (f64::from(home.x), f64::from(home.y)),
-                now_px: (f64::from(now.x), f64::from(now.y)),
-                home_scale_px: f64::from(home.sigma),
-                now_scale_px: f64::from(now.sigma),
-                distance: f64::from(choice.candidate.distance),
-                home_sd_rad: sd_rad(home, 0.0, &self.home_projection, settings),
-                now_sd_rad: sd_rad(now, choice.candidate.distance, &projection, settings),
-            });
-        }
+            let fits = |c: &Candidate| frame.fit(&self.home_sights[c.home], &sights[c.now]).is_good();
+            matching::choose(&self.candidates, home, now, settings.distance, settings.guided_ratio, fits)
+        };
+        let motion = motion::polish(&pairs(&guided(motion)), motion);
+        guided(motion)
     }
 }
+
+/// Candidates are kept up to this many times the largest distance of a match, to serve as runners-up.
+const RUNNER_UP: f32 = 1.15;
 
 /// Row of the horizon, counted from the centre of row 0.
 fn horizon(projection: &Projection) -> f32 {

@@ -59,6 +59,13 @@ pub(super) struct Fit {
     pub possible: bool,
 }
 
+impl Fit {
+    /// Whether the match may be right.
+    pub fn is_good(&self) -> bool {
+        self.possible && self.chi2 < CHI2_LIMIT
+    }
+}
+
 /// A motion with its vectors at hand.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Frame {
@@ -77,7 +84,7 @@ const SCALE_SLACK: f64 = 1.8;
 /// Standard deviations by which a match may miss what geometry allows.
 const REACH: f64 = 3.0;
 /// The same squared: the limit of `Fit::chi2`.
-pub(super) const CHI2_LIMIT: f64 = REACH * REACH;
+const CHI2_LIMIT: f64 = REACH * REACH;
 
 /// The sines and cosines that (1) is made of.
 struct Angles {
@@ -215,7 +222,7 @@ fn judge(pairs: &[Pair], motion: PlanarMotion) -> (f64, PlanarMotion) {
     let mut support = [0.0; 2];
     for pair in pairs {
         for (fit, support) in frame.fit_both(&pair.home, &pair.now).iter().zip(&mut support) {
-            if fit.possible && fit.chi2 < CHI2_LIMIT {
+            if fit.is_good() {
                 *support += 1.0 - fit.chi2 / CHI2_LIMIT;
             }
         }
@@ -304,7 +311,7 @@ mod tests {
         let pairs = room(pose, 0);
         let count = |motion: PlanarMotion| {
             let frame = motion.frame();
-            pairs.iter().filter(|p| frame.fit(&p.home, &p.now).possible && frame.fit(&p.home, &p.now).chi2 < CHI2_LIMIT).count()
+            pairs.iter().filter(|p| frame.fit(&p.home, &p.now).is_good()).count()
         };
         assert_eq!(count(motion), pairs.len());
         assert!(count(PlanarMotion { turn_rad: 2.2, ..motion }) < pairs.len() / 5);
