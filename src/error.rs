@@ -14,7 +14,7 @@ pub enum Error {
     /// A file or folder could not be read or written.
     #[error("cannot {action} {}: {source}", path.display())]
     Io {
-        /// What was tried: "read", "write", "create folder".
+        /// What was tried: "read", "write", "remove", "create folder".
         action: &'static str,
         /// The file or folder.
         path: PathBuf,
@@ -47,6 +47,14 @@ pub enum Error {
         /// What is allowed.
         allowed: String,
     },
+    /// A folder for results holds something that the command has not written.
+    #[error("{} holds {found}, which this command did not write; choose another folder with --out", path.display())]
+    OutputTaken {
+        /// The folder.
+        path: PathBuf,
+        /// What it holds.
+        found: String,
+    },
     /// No graphics adapter serves the renderer.
     #[error(
         "no graphics adapter for the GPU renderer ({0}); use --renderer cpu, or install a Vulkan driver (on Debian mesa-vulkan-drivers is a software one)"
@@ -63,6 +71,9 @@ pub enum Error {
         /// The codec's reason.
         source: image::ImageError,
     },
+    /// Worker threads could not be started.
+    #[error("cannot start worker threads: {0}")]
+    Threads(String),
     /// The run was stopped from outside (Ctrl-C).
     #[error("interrupted")]
     Interrupted,
@@ -72,7 +83,7 @@ fn format_faults(path: &std::path::Path, faults: &[WorldFault]) -> String {
     use std::fmt::Write;
     let mut text = format!("{}: {} fault{}", path.display(), faults.len(), if faults.len() == 1 { "" } else { "s" });
     for f in faults {
-        let _ = write!(text, "\n  {}: found {}, allowed is {}", f.place, f.found, f.allowed);
+        let _ = write!(text, "\n  {f}");
     }
     text
 }

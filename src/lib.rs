@@ -1,4 +1,68 @@
 //! Headless, physics-simulated robot testbed for bearing-only visual homing.
+//!
+//! # The story of a run
+//!
+//! A [`world`] is loaded and checked as a whole: a room, bodies in it, floor friction, a robot with a panoramic camera, and
+//! the pose that is called home.
+//!
+//! ```
+//! use wayhome::world::World;
+//!
+//! let world = World::open("lab")?; // a built-in world; a path opens a file
+//! assert_eq!(world.spec.name, "lab");
+//! assert!(world.bodies.len() > 5);
+//! # Ok::<(), wayhome::Error>(())
+//! ```
+//!
+//! [`physics`] moves the robot: wheels that slip, motors, encoders that count, walls that stop it. The [`render`]er draws what
+//! the camera sees from where the robot really is, as a [`panorama`] with range and instance beside the colours.
+//!
+//! ```
+//! use wayhome::panorama::Panorama;
+//! use wayhome::render::{self, RendererChoice, Scene, View};
+//! use wayhome::world::World;
+//!
+//! let world = World::open("lab")?;
+//! let scene = Scene::new(&world)?;
+//! let mut renderer = render::create(RendererChoice::Cpu)?;
+//! let projection = world.projection_of_size(360, 45);
+//! let mut seen = Panorama::black(projection);
+//! renderer.render(&scene, &View { projection, robot: world.home, bodies: &world.body_poses() }, &mut seen)?;
+//! assert!(seen.range_m.iter().all(|&r| r > 0.0), "a room is closed: every ray ends on a surface");
+//! # Ok::<(), wayhome::Error>(())
+//! ```
+//!
+//! [`vision`] finds features of the home panorama again and turns them into bearings, and to nothing else: from here on no code
+//! sees an image. A method gets [`observation`]s only: the home snapshot once, then bearings and wheel odometry. Its
+//! [`estimation`] says where home is, its [`control`] turns the wheels. The types of an observation hold no truth, so a method
+//! cannot look at it.
+//!
+//! An [`episode`] joins a plant, a sensor and a method, closes the loop and keeps the record.
+//!
+//! ```
+//! use std::ops::ControlFlow;
+//! use wayhome::episode::{Bearings, Bench, Outcome, PlantKind, Setup};
+//! use wayhome::world::World;
+//!
+//! let world = World::open("lab")?;
+//! let setup = Setup { plant: PlantKind::Unicycle, bearings: Bearings::Noisy, ..Setup::default() };
+//! let record = Bench::new(&world, &setup)?.run(7, &mut |_| ControlFlow::Continue(()))?;
+//! assert_eq!(record.outcome, Outcome::Home);
+//! # Ok::<(), wayhome::Error>(())
+//! ```
+//!
+//! A [`study`] repeats episodes, a [`report`] writes what came of them.
+//!
+//! # Floors
+//!
+//! Each module imports only what lies below it. From the top: the command line; `report`; `study`; `episode`; then side by
+//! side and blind to one another `physics`, `render`, `vision`, `estimation` and `control`; then `world`, `panorama` and
+//! `observation`; at the bottom [`geometry`], [`random`] streams and [`error`]s.
+//!
+//! # Units and randomness
+//!
+//! SI units; x forward, y left, angles anti-clockwise. One seed gives a run: the same bytes on any number of threads, and with
+//! the CPU renderer on any machine. That is why trigonometry goes through [`geometry`] and never through the platform.
 
 pub mod control;
 pub mod episode;
@@ -11,6 +75,7 @@ pub mod physics;
 pub mod random;
 pub mod render;
 pub mod report;
+pub mod study;
 pub mod vision;
 pub mod world;
 

@@ -1,5 +1,27 @@
-//! The `wayhome` command.
+//! The `wayhome` command. This is the one place that turns an outcome into an exit code.
 
 mod cli;
 
-fn main() {}
+use std::io::Write;
+use std::process::ExitCode;
+
+use clap::Parser;
+use wayhome::Error;
+
+fn main() -> ExitCode {
+    // On a fault in the arguments clap explains and leaves with 2, after `--help` and `--version` with 0.
+    let args = cli::args::Args::parse();
+    match cli::run(args) {
+        Ok(cli::Verdict::Done) => ExitCode::SUCCESS,
+        Ok(cli::Verdict::NotHome) => ExitCode::from(3),
+        Err(error) => {
+            // Nobody is left to tell when stderr is gone.
+            let _ = writeln!(std::io::stderr(), "error: {error:#}");
+            match error.downcast_ref::<Error>() {
+                Some(Error::Invalid { .. }) => ExitCode::from(2),
+                Some(Error::Interrupted) => ExitCode::from(130),
+                _ => ExitCode::FAILURE,
+            }
+        }
+    }
+}

@@ -111,6 +111,32 @@ impl Estimate {
         crate::geometry::wrap(crate::geometry::angle_of(-self.pose.position()) - self.pose.heading)
     }
 
+    /// Standard deviation of the range to home, m, to first order.
+    #[must_use]
+    pub fn range_sd_m(&self) -> f64 {
+        let (s, c) = crate::geometry::sin_cos(self.bearing_rad());
+        self.variance_along(c, s).max(0.0).sqrt()
+    }
+
+    /// Standard deviation of the robot's bearing from home, rad, to first order; it grows without bound towards home.
+    #[must_use]
+    pub fn bearing_sd_rad(&self) -> f64 {
+        let (s, c) = crate::geometry::sin_cos(self.bearing_rad());
+        self.variance_along(-s, c).max(0.0).sqrt() / self.range_m()
+    }
+
+    /// Standard deviation of the heading, rad.
+    #[must_use]
+    pub fn heading_sd_rad(&self) -> f64 {
+        self.covariance[(2, 2)].max(0.0).sqrt()
+    }
+
+    /// Variance of the position along the unit vector (x, y), m^2.
+    fn variance_along(&self, x: f64, y: f64) -> f64 {
+        let c = &self.covariance;
+        x * x * c[(0, 0)] + 2.0 * x * y * c[(0, 1)] + y * y * c[(1, 1)]
+    }
+
     /// Larger standard deviation of the position, along the long axis of its ellipse, m.
     #[must_use]
     pub fn position_sd_m(&self) -> f64 {

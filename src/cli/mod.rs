@@ -1,1 +1,36 @@
-//! cli
+//! The command line: one file a subcommand, each a `run(args, context)`.
+//!
+//! Results go to stdout, diagnostics and progress to stderr. A subcommand returns a [`Verdict`] or an error; `main` turns that
+//! into an exit code.
+
+pub mod args;
+mod context;
+mod drive;
+mod home;
+mod render;
+mod world;
+
+use anyhow::Result;
+
+use args::{Args, Command};
+use context::Context;
+
+/// What a command that ran to its end came to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Verdict {
+    /// Done; where the task was to come home, home was reached.
+    Done,
+    /// The run ended without reaching home.
+    NotHome,
+}
+
+/// Runs the command.
+pub fn run(args: Args) -> Result<Verdict> {
+    let context = Context::new(&args.common)?;
+    match args.command {
+        Command::Drive(args) => drive::run(&args, &context),
+        Command::Home(args) => home::run(&args, &context),
+        Command::Render(args) => render::run(&args, &context),
+        Command::World(args) => world::run(&args, &context),
+    }
+}

@@ -1,1 +1,129 @@
-//! control
+//! Control laws: from the believed pose to wheel commands.
+//!
+//! A law steers; a governor sets the speed. Both see only an estimate's pose and the data sheets, never the simulator.
+
+use crate::geometry::{Pose, Twist, angle_of, wrap};
+use crate::observation::{RobotSheet, TaskSheet};
+
+/// Steering laws.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Law {
+    /// The paper's omega = pi - (alpha - theta), wrapped, with a gain.
+    Proportional,
+    /// The paper's (16): omega = beta (v / Rc) sgn(theta'), beta > 1.
+    Lyapunov,
+}
+
+/// Gain of the proportional law on robots that can turn fast, 1/s. The paper's own gain is 1.
+const STEERING_GAIN: f64 = 4.0;
+/// The paper's beta.
+const BETA: f64 = 1.5;
+/// Deceleration planned for the last stretch, as a share of the drive's own.
+const BRAKING_SHARE: f64 = 0.9;
+
+/// A steering law with the limits of robot and task.
+#[derive(Debug, Clone, Copy)]
+pub struct Controller {
+    law: Law,
+    robot: RobotSheet,
+    task: TaskSheet,
+}
+
+impl Controller {
+    /// A controller for one robot and task.
+    #[must_use]
+    pub fn new(law: Law, robot: RobotSheet, task: TaskSheet) -> Self {
+        Self { law, robot, task }
+    }
+
+    /// Yaw rate of the law alone, limited to the robot's, for a robot at `pose` in the home frame driving at `v`.
+    ///
+    /// The Lyapunov law is a relay. Sampled, a relay chatters by as much as the robot turns in one period; the yaw rate is
+    /// therefore held to what brings the heading onto the home direction within one period.
+    #[must_use]
+    pub fn steer(&self, pose: &Pose, v: f64) -> f64 {
+        let error = home_direction(pose);
+        let omega = match self.law {
+            Law::Proportional => STEERING_GAIN * error,
+            Law::Lyapunov => {
+                // theta' = v sin(alpha - theta) / R has the sign of the error: alpha - theta = pi - error.
+                let relay = BETA * v / self.task.arrival_radius_m * error.signum();
+                let enough = error.abs() / self.task.control_period_s;
+                relay.clamp(-enough, enough)
+            }
+        };
+        omega.clamp(-self.robot.max_turn_rate_rad_s, self.robot.max_turn_rate_rad_s)
+    }
+
+    /// Twist that drives a robot at `pose` (home frame) home: cruising speed, less while it points elsewhere, and no more than
+    /// still lets it stop at home.
+    #[must_use]
+    pub fn drive(&self, pose: &Pose) -> Twist {
+        let range = pose.position().norm();
+        let error = home_direction(pose);
+        let cruise = self.task.speed_m_s.min(self.robot.max_speed_m_s);
+        // The greatest speed that, held for one period more, can still be braked to rest at home: v T + v^2 / (2 a) = range.
+        let a = BRAKING_SHARE * self.robot.max_acceleration_m_s2;
+        let period = self.task.control_period_s;
+        let braking = a * ((period * period + 2.0 * range / a).sqrt() - period);
+        let facing = libm::cos(error.clamp(-std::f64::consts::FRAC_PI_2, std::f64::consts::FRAC_PI_2));
+        // The relay turns only while it moves: it needs a little speed even when it faces away.
+        let least = if self.law == Law::Lyapunov { 0.1 } else { 0.0 };
+        let v = cruise.min(braking) * facing.max(least);
+        Twist { v, omega: self.steer(pose, v) }
+    }
+
+    /// Twist that follows a direction (rad from the heading) at cruising speed, for when only a direction is known.
+    #[must_use]
+    pub fn follow(&self, direction_rad: f64) -> Twist {
+        let far = -crate::geometry::direction(wrap(direction_rad)) * 1e3;
+        self.drive(&Pose::new(far.x, far.y, 0.0))
+    }
+}
+
+/// Direction of home from the robot's heading, rad: pi - (alpha - theta), wrapped.
+fn home_direction(pose: &Pose) -> f64 {
+    wrap(angle_of(-pose.position()) - pose.heading)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn controller(law: Law) -> Controller {
+        Controller::new(
+            law,
+            RobotSheet { track_m: 0.23, max_speed_m_s: 0.3, max_turn_rate_rad_s: 1.9, max_acceleration_m_s2: 0.9 },
+            TaskSheet { speed_m_s: 0.3, control_period_s: 0.1, arrival_radius_m: 0.05 },
+        )
+    }
+
+    /// Either law brings a perfect unicycle home from any heading.
+    #[test]
+    fn both_laws_arrive() {
+        for law in [Law::Proportional, Law::Lyapunov] {
+            let c = controller(law);
+            for k in 0..12 {
+                let mut pose = Pose::new(1.3, -0.8, f64::from(k) * 0.55);
+                let mut nearest = f64::INFINITY;
+                for _ in 0..200 {
+                    pose = pose.advanced(c.drive(&pose), 0.1);
+                    nearest = nearest.min(pose.position().norm());
+                }
+                assert!(nearest < 0.02, "{law:?} {k} {nearest}");
+            }
+        }
+    }
+
+    /// The sign of the relay is that of the paper's theta'.
+    #[test]
+    fn relay_has_the_sign_of_theta_dot() {
+        let c = controller(Law::Lyapunov);
+        for k in 0..20 {
+            let pose = Pose::new(0.4, 0.9, f64::from(k) * 0.3);
+            let theta = angle_of(pose.position());
+            let theta_dot = libm::sin(pose.heading - theta);
+            assert!(c.steer(&pose, 0.3) * theta_dot >= 0.0);
+        }
+    }
+}

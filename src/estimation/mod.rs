@@ -1,1 +1,10 @@
-//! estimation
+//! Estimators: where is the robot relative to home, from bearings and odometry alone.
+//!
+//! - [`anchored`]: the filter of the main job; nothing needs to be known at the start.
+//! - [`paper`]: the paper's six-state EKF, exactly as printed but for the transition Jacobian; it must be started near the truth.
+//! - [`resection`] and [`gaussian`] serve the anchored filter.
+
+pub mod anchored;
+pub mod gaussian;
+pub mod paper;
+pub mod resection;

@@ -1,1 +1,23 @@
-//! report
+//! Reports: what a run leaves on disk and on the screen.
+//!
+//! Reports know results, not how they came about. All files go through an [`OutputFolder`], which writes each of them whole or
+//! not at all and refuses to touch a folder that holds anything else.
+
+pub mod drive;
+mod folder;
+pub mod image;
+pub mod map;
+mod path_plot;
+pub mod run;
+pub mod seeds;
+pub mod text;
+
+pub use folder::{OutputFolder, write_atomically};
+
+/// Indented JSON with a line end.
+pub fn json(value: &impl serde::Serialize) -> String {
+    // Plain structs with text keys always serialise; NaN becomes null.
+    let mut text = serde_json::to_string_pretty(value).unwrap_or_default();
+    text.push('\n');
+    text
+}

@@ -2,15 +2,59 @@
 
 use std::path::Path;
 
+use serde::Deserialize;
 use sha2::{Digest, Sha256};
 
+use super::document::Node;
+use super::polygon::anticlockwise;
+use super::robot::{RobotPreset, RobotSpec};
 use super::spec::{ShapeSpec, TextureSpec, WorldSpec};
+use super::structure::{self, Findings};
+use super::validate;
 use super::{Body, Footprint, World, Zone};
 use crate::error::{Error, Result};
 use crate::geometry::{Pose, Vector2};
 use crate::panorama::INSTANCE_FIRST_WALL;
 
+/// The worlds that the program carries with it, as (name, TOML text).
+const BUILTIN: [(&str, &str); 6] = [
+    ("lab", include_str!("../../worlds/lab.toml")),
+    ("slippery", include_str!("../../worlds/slippery.toml")),
+    ("crowd", include_str!("../../worlds/crowd.toml")),
+    ("paper-ideal", include_str!("../../worlds/paper-ideal.toml")),
+    ("paper-grid", include_str!("../../worlds/paper-grid.toml")),
+    ("vardy-hall", include_str!("../../worlds/vardy-hall.toml")),
+];
+
 impl World {
+    /// Opens a world by what a person typed: the path of a file if there is one, else the name of a built-in world, as `NAME`
+    /// or `worlds/NAME.toml`.
+    ///
+    /// # Errors
+    /// When there is neither, and as [`World::load`].
+    pub fn open(argument: &str) -> Result<Self> {
+        let path = Path::new(argument);
+        if path.is_file() {
+            return Self::load(path);
+        }
+        let bare = argument.strip_prefix("worlds/").unwrap_or(argument);
+        let bare = bare.strip_suffix(".toml").unwrap_or(bare);
+        match BUILTIN.iter().find(|(name, _)| *name == bare) {
+            Some((name, text)) => Self::from_toml(text, format!("builtin:{name}")),
+            None => Err(Error::Invalid {
+                what: "world".to_owned(),
+                found: format!("{argument}, which is no file"),
+                allowed: format!("a world file (TOML or JSON), or a built-in world: {}", Self::builtin_names().join(", ")),
+            }),
+        }
+    }
+
+    /// Names of the built-in worlds.
+    #[must_use]
+    pub fn builtin_names() -> Vec<&'static str> {
+        BUILTIN.iter().map(|(name, _)| *name).collect()
+    }
+
     /// Loads and checks a world file: TOML, or JSON where the name ends in `.json`.
     ///
     /// # Errors
@@ -18,24 +62,89 @@ impl World {
     pub fn load(path: &Path) -> Result<Self> {
         let text =
             std::fs::read_to_string(path).map_err(|source| Error::Io { action: "read", path: path.to_owned(), source })?;
-        let parse_error = |message: String| Error::Parse { path: path.to_owned(), message };
-        let spec: WorldSpec = if path.extension().is_some_and(|e| e == "json") {
-            serde_json::from_str(&text).map_err(|e| parse_error(e.to_string()))?
+        if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("json")) {
+            Self::from_json(&text, path)
         } else {
-            toml::from_str(&text).map_err(|e| parse_error(e.to_string()))?
-        };
-        let sha256 = Sha256::digest(text.as_bytes()).iter().map(|b| format!("{b:02x}")).collect();
-        Ok(Self::resolve(spec, path, sha256))
+            Self::from_toml(&text, path)
+        }
     }
 
-    fn resolve(spec: WorldSpec, source: &Path, sha256: String) -> Self {
+    /// JSON Schema of the world file (draft 2020-12).
+    #[must_use]
+    pub fn json_schema() -> serde_json::Value {
+        schemars::schema_for!(WorldSpec).to_value()
+    }
+
+    /// Checks a world given as TOML text. `source` names it in messages.
+    ///
+    /// # Errors
+    /// As [`World::load`].
+    pub fn from_toml(text: &str, source: impl AsRef<Path>) -> Result<Self> {
+        Self::from_tree(Node::from_toml(text, source.as_ref())?, source.as_ref(), sha256(text))
+    }
+
+    /// Checks a world given as JSON text. `source` names it in messages.
+    ///
+    /// # Errors
+    /// As [`World::load`].
+    pub fn from_json(text: &str, source: impl AsRef<Path>) -> Result<Self> {
+        Self::from_tree(Node::from_json(text, source.as_ref())?, source.as_ref(), sha256(text))
+    }
+
+    /// Checks a world that a program made or changed. `source` names it in messages; the SHA-256 is that of its JSON form.
+    ///
+    /// # Errors
+    /// When it has faults; all of them come at once.
+    pub fn from_spec(spec: &WorldSpec, source: impl AsRef<Path>) -> Result<Self> {
+        let parse_error = |message: String| Error::Parse { path: source.as_ref().to_owned(), message };
+        let tree = Node::from_spec(spec).map_err(|e| parse_error(e.to_string()))?;
+        let json = serde_json::to_string(spec).map_err(|e| parse_error(e.to_string()))?;
+        Self::from_tree(tree, source.as_ref(), sha256(&json))
+    }
+
+    fn from_tree(mut tree: Node, path: &Path, sha256: String) -> Result<Self> {
+        let as_read = tree.clone(); // the check below removes unknown fields, whose lines are still wanted
+        let Findings { unknown, not_finite, unreadable } = structure::check(&mut tree, &Self::json_schema());
+        let mut faults = unknown;
+        if unreadable.is_empty() {
+            if let Some(preset) = tree.get("robot").and_then(|robot| robot.get("preset")).cloned() {
+                let parse_error = |message: String| Error::Parse { path: path.to_owned(), message };
+                let preset = RobotPreset::deserialize(preset).map_err(|e| parse_error(e.to_string()))?;
+                let robot = Node::from_spec(&RobotSpec::of(preset)).map_err(|e| parse_error(e.to_string()))?;
+                tree.fill("robot", robot);
+            }
+            let spec =
+                WorldSpec::deserialize(tree).map_err(|e| Error::Parse { path: path.to_owned(), message: e.to_string() })?;
+            faults.extend(validate::check(&spec, &not_finite));
+            if faults.is_empty() && not_finite.is_empty() {
+                return Ok(Self::resolve(spec, path, sha256));
+            }
+        }
+        faults.extend(not_finite);
+        faults.extend(unreadable);
+        for fault in &mut faults {
+            (fault.line, fault.owner) = as_read.locate(&fault.place);
+        }
+        faults.sort_by_key(|f| f.line); // in reading order where lines are known, else as found
+        Err(Error::World { path: path.to_owned(), faults })
+    }
+
+    /// The checked form of a spec that has no faults. Never panics where the room has none.
+    pub(super) fn resolve(spec: WorldSpec, source: &Path, sha256: String) -> Self {
         let outline = anticlockwise(&spec.room.outline_m);
+        let clockwise = outline.get(1).is_some_and(|c| [c.x, c.y] != spec.room.outline_m[1]);
         let seeded = |texture: &TextureSpec, n: u64| TextureSpec {
             seed: Some(texture.seed.unwrap_or_else(|| spec.seed.wrapping_mul(1000).wrapping_add(n))),
             ..*texture
         };
         let walls = &spec.room.walls;
-        let wall_textures: Vec<_> = (0..outline.len()).map(|k| seeded(&walls[k % walls.len()], 10 + k as u64)).collect();
+        let wall_textures: Vec<_> = (0..outline.len())
+            .map(|k| {
+                // A clockwise outline is turned round; its walls keep the textures that they have in the file.
+                let as_written = if clockwise { outline.len() - 1 - k } else { k };
+                seeded(&walls[as_written % walls.len()], 10 + as_written as u64)
+            })
+            .collect();
         let first_body = INSTANCE_FIRST_WALL + outline.len() as u16;
         let bodies = spec
             .landmarks
@@ -84,13 +193,7 @@ impl World {
     }
 }
 
-/// The corners in anti-clockwise order, starting with the first as written.
-fn anticlockwise(corners: &[[f64; 2]]) -> Vec<Vector2<f64>> {
-    let mut corners: Vec<_> = corners.iter().map(|c| Vector2::new(c[0], c[1])).collect();
-    let doubled_area: f64 =
-        (0..corners.len()).map(|k| crate::geometry::cross(corners[k], corners[(k + 1) % corners.len()])).sum();
-    if doubled_area < 0.0 {
-        corners[1..].reverse();
-    }
-    corners
+/// SHA-256 of a text's bytes, lower-case hexadecimal.
+fn sha256(text: &str) -> String {
+    Sha256::digest(text.as_bytes()).iter().map(|b| format!("{b:02x}")).collect()
 }

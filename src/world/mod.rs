@@ -1,16 +1,26 @@
 //! Worlds: rooms with landmarks, obstacles, floor, robot, camera and home, loaded from a file and checked as a whole.
 //!
 //! [`WorldSpec`] is the file as written, [`World`] the checked form: absolute corners, radians, instance ids. Loading reports
-//! every fault of a file at once; see [`WorldFault`].
+//! every fault of a file at once; see [`WorldFault`]. It goes through three gates: the text becomes a tree that knows its
+//! lines (`document`), the tree is compared with the schema (`structure`), and the spec's values and places are checked
+//! (`validate`). A [`World`] also tells where a robot may stand and start (`free`).
 
+pub mod convex;
+mod document;
+mod free;
 mod load;
+pub mod polygon;
+pub mod robot;
 pub mod spec;
+mod structure;
+mod validate;
 
 use std::path::PathBuf;
 
 use crate::geometry::{Pose, Vector2};
 use crate::panorama::{INSTANCE_FIRST_WALL, Projection};
-pub use spec::{MotionSpec, RobotSpec, TaskSpec, TextureFamily, TextureSpec, WorldSpec};
+pub use robot::RobotSpec;
+pub use spec::{MotionSpec, TaskSpec, TextureFamily, TextureSpec, WorldSpec};
 
 /// One fault of a world file.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -21,6 +31,23 @@ pub struct WorldFault {
     pub found: String,
     /// What is allowed.
     pub allowed: String,
+    /// Name of the body, zone or start that the place belongs to.
+    pub owner: Option<String>,
+    /// Line of the place, from 1, where the file's format tells it.
+    pub line: Option<usize>,
+}
+
+impl std::fmt::Display for WorldFault {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        if let Some(line) = self.line {
+            write!(f, "line {line}: ")?;
+        }
+        write!(f, "{}", self.place)?;
+        if let Some(owner) = &self.owner {
+            write!(f, " (\"{owner}\")")?;
+        }
+        write!(f, ": found {}, allowed is {}", self.found, self.allowed)
+    }
 }
 
 /// A checked world.
@@ -78,6 +105,14 @@ pub struct Body {
     pub motion: Option<MotionSpec>,
     /// Instance id in panoramas.
     pub instance: u16,
+}
+
+impl Body {
+    /// Whether it stands where it is unless something pushes it.
+    #[must_use]
+    pub fn stands(&self) -> bool {
+        matches!(self.motion, None | Some(MotionSpec::Pushed { .. }))
+    }
 }
 
 /// A floor zone of a checked world.

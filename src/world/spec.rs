@@ -5,6 +5,8 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::robot::RobotSpec;
+
 /// A whole world file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -45,6 +47,9 @@ pub struct WorldSpec {
     /// Speed, period, arrival radius, time limit.
     #[serde(default)]
     pub task: TaskSpec,
+    /// What happens to the robot at given times.
+    #[serde(default)]
+    pub disturbances: Vec<DisturbanceSpec>,
 }
 
 /// A pose as a person writes it.
@@ -256,7 +261,7 @@ pub struct BodySpec {
     pub motion: Option<MotionSpec>,
 }
 
-/// How a moving body moves. Moving bodies are driven, not pushed: the robot bounces off them.
+/// How a moving body moves. Those that go by themselves are driven, not pushed: the robot bounces off them.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub enum MotionSpec {
@@ -277,79 +282,19 @@ pub enum MotionSpec {
         /// Speed, m/s.
         speed_m_s: f64,
     },
+    /// Stands until something pushes it, and slides to rest on the floor's friction: a carton, a chair.
+    Pushed {
+        /// Mass, kg; spread evenly over the footprint.
+        mass_kg: f64,
+        /// Coulomb friction of the body on the floor, which zones do not change.
+        #[serde(default = "MotionSpec::default_friction")]
+        friction: f64,
+    },
 }
 
-/// A differential-drive robot with two drive wheels and a caster. Defaults: an iRobot Create 3 (mass 2.3 kg, radius 0.164 m,
-/// track 0.233 m, caster 0.125 m ahead of the axle, as its data sheet has them) with a generic small gear motor.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, default)]
-pub struct RobotSpec {
-    /// Mass, kg.
-    pub mass_kg: f64,
-    /// Radius of the round body, m.
-    pub radius_m: f64,
-    /// Height of the body, m; what hangs higher is driven under.
-    pub height_m: f64,
-    /// Yaw inertia about the centre of gravity, kg m^2; by default that of a uniform disc.
-    pub yaw_inertia_kg_m2: Option<f64>,
-    /// Centre of gravity ahead of the axle, m.
-    pub centre_of_gravity_m: f64,
-    /// Distance between the wheels, m.
-    pub track_m: f64,
-    /// Wheel radius, m.
-    pub wheel_radius_m: f64,
-    /// Inertia of one wheel with its gear and rotor as felt at the wheel, kg m^2.
-    pub wheel_inertia_kg_m2: f64,
-    /// Caster ahead of the axle (negative: behind), m.
-    pub caster_m: f64,
-    /// Friction of the caster, as a share of the floor's.
-    pub caster_friction: f64,
-    /// Slip speed at which friction saturates, m/s: the creep that makes odometry drift without a visible skid.
-    pub creep_m_s: f64,
-    /// Wheel torque of a stalled motor at full voltage, N m.
-    pub stall_torque_n_m: f64,
-    /// Wheel speed of an unloaded motor at full voltage, rad/s.
-    pub no_load_speed_rad_s: f64,
-    /// Proportional gain of the wheel-speed loop, share of full voltage per rad/s.
-    pub speed_gain: f64,
-    /// Integral gain of the wheel-speed loop, share of full voltage per rad.
-    pub speed_integral_gain: f64,
-    /// Encoder counts per turn of the wheel.
-    pub encoder_counts_per_turn: f64,
-    /// Relative error of the odometry's wheel radius, left and right: what calibration left over.
-    pub wheel_radius_error: [f64; 2],
-    /// Greatest commanded forward speed, m/s.
-    pub max_speed_m_s: f64,
-    /// Greatest commanded yaw rate, rad/s.
-    pub max_turn_rate_rad_s: f64,
-    /// Greatest commanded acceleration, m/s^2.
-    pub max_acceleration_m_s2: f64,
-}
-
-impl Default for RobotSpec {
-    fn default() -> Self {
-        Self {
-            mass_kg: 2.3,
-            radius_m: 0.164,
-            height_m: 0.35,
-            yaw_inertia_kg_m2: None,
-            centre_of_gravity_m: 0.03,
-            track_m: 0.233,
-            wheel_radius_m: 0.036,
-            wheel_inertia_kg_m2: 1.0e-4,
-            caster_m: 0.125,
-            caster_friction: 0.05,
-            creep_m_s: 0.01,
-            stall_torque_n_m: 0.6,
-            no_load_speed_rad_s: 16.0,
-            speed_gain: 0.4,
-            speed_integral_gain: 4.0,
-            encoder_counts_per_turn: 508.8,
-            wheel_radius_error: [0.003, -0.002],
-            max_speed_m_s: 0.306,
-            max_turn_rate_rad_s: 1.9,
-            max_acceleration_m_s2: 0.9,
-        }
+impl MotionSpec {
+    fn default_friction() -> f64 {
+        0.4
     }
 }
 
@@ -430,4 +375,30 @@ impl Default for TaskSpec {
     fn default() -> Self {
         Self { speed_m_s: 0.3, control_period_s: 0.1, arrival_radius_m: 0.05, time_limit_s: 120.0 }
     }
+}
+
+/// Something that happens to the robot at a given time.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct DisturbanceSpec {
+    /// When, s from the start of the run.
+    pub at_s: f64,
+    /// What.
+    pub what: DisturbanceKind,
+}
+
+/// What can happen to the robot.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub enum DisturbanceKind {
+    /// A blow that changes the robot's motion at once; the `unicycle` plant, which has no mass, does not feel it.
+    Kick {
+        /// Impulse on the centre of gravity along the room's x and y, N s.
+        impulse_n_s: [f64; 2],
+        /// Impulse that turns, anti-clockwise, N m s.
+        #[serde(default)]
+        turn_n_m_s: f64,
+    },
+    /// The robot is lifted and set down at rest somewhere else. Neither encoders nor gyro notice.
+    Kidnap(PoseSpec),
 }

@@ -1,0 +1,341 @@
+//! The arguments, and how a person writes their values.
+
+use std::ops::RangeInclusive;
+use std::path::PathBuf;
+
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use clap::{Parser, Subcommand};
+use wayhome::episode::method::{LawKind, MethodKind};
+use wayhome::episode::{Bearings, PlantKind, Start};
+use wayhome::geometry::Pose;
+use wayhome::render::RendererChoice;
+
+/// Shown under every `--help`.
+const EXIT_CODES: &str = "Exit codes:
+  0    done; for a single run of `home`: home was reached
+  1    failed: a file, a folder or a device
+  2    usage: an argument or one of its values is not allowed
+  3    a single run of `home` ended without reaching home
+  130  interrupted by Ctrl-C; nothing half written is left behind";
+
+/// Heading of the flags that all subcommands have.
+const GENERAL: &str = "General options";
+/// Shown under `drive --help`.
+const DRIVE_HELP: &str = "Commands are CSV with a header, times from 0 on:
+  t_s,v_m_s,omega_rad_s
+  0,0.3,0
+  2,0.2,0.8
+  5,0,0
+Each row holds until the time of the next; the last row is the end.
+
+Exit codes:
+  0    done
+  1    failed: a file or a folder
+  2    usage: an argument or one of its values is not allowed
+  130  interrupted by Ctrl-C; nothing half written is left behind";
+
+/// Headless, physics-simulated robot testbed for bearing-only visual homing
+#[derive(Debug, Parser)]
+#[command(version, after_help = EXIT_CODES)]
+pub struct Args {
+    #[command(flatten)]
+    pub common: CommonArgs,
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+/// Flags of all subcommands.
+#[derive(Debug, clap::Args)]
+pub struct CommonArgs {
+    /// Print one JSON object on stdout
+    #[arg(long, global = true, help_heading = GENERAL)]
+    pub json: bool,
+    /// No progress and no diagnostics on stderr, errors excepted
+    #[arg(long, short, global = true, help_heading = GENERAL)]
+    pub quiet: bool,
+    /// Worker threads [default: one a processor]; no result depends on their number
+    #[arg(long, global = true, help_heading = GENERAL, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub threads: Option<u16>,
+}
+
+/// The subcommands.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Drive home: one closed-loop run, or one a seed
+    #[command(after_help = EXIT_CODES)]
+    Home(Box<HomeArgs>),
+    /// Drive a table of commands open loop and record truth, odometry, wheels, slip and forces
+    #[command(after_help = DRIVE_HELP)]
+    Drive(DriveArgs),
+    /// Render one panorama with range and instance ids
+    #[command(after_help = EXIT_CODES)]
+    Render(RenderArgs),
+    /// Check, draw and describe world files
+    World(WorldArgs),
+}
+
+/// Arguments of `home`.
+#[derive(Debug, clap::Args)]
+pub struct HomeArgs {
+    /// World file, or the name of a built-in world
+    #[arg(default_value = "worlds/lab.toml")]
+    pub world: String,
+    /// What moves when the wheels are commanded
+    #[arg(long, default_value = "rapier", value_parser = choice(PLANTS))]
+    pub plant: PlantKind,
+    /// Where bearings come from
+    #[arg(long, default_value = "rendered", value_parser = choice(BEARINGS))]
+    pub bearings: Bearings,
+    /// Homing method
+    #[arg(long, default_value = "anchored-ekf", value_parser = choice(METHODS))]
+    pub method: MethodKind,
+    /// Steering law of the methods that estimate where home is
+    #[arg(long, default_value = "proportional", value_parser = choice(LAWS))]
+    pub controller: LawKind,
+    /// What renders
+    #[arg(long, default_value = "auto", value_parser = choice(RENDERERS))]
+    pub renderer: RendererChoice,
+    /// Columns and rows of the panorama, 16x8 to 16384x4096 [default: the world's]
+    #[arg(long, value_name = "WxH", value_parser = size)]
+    pub size: Option<(u32, u32)>,
+    /// Start: `random`, the name of one of the world's starts, or a pose x,y,heading_deg
+    #[arg(long, default_value = "random", allow_hyphen_values = true, value_parser = start)]
+    pub start: Start,
+    /// Seed of the run
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub seed: u64,
+    /// Run all seeds from A to B, both included, in parallel and report on all of them together
+    #[arg(long, value_name = "A..B", conflicts_with = "seed", value_parser = seeds)]
+    pub seeds: Option<RangeInclusive<u64>>,
+    /// Pose in the home frame at which a filter starts that has to be given one (paper-ekf): x,y,heading_deg
+    #[arg(long, value_name = "x,y,heading_deg", allow_hyphen_values = true, value_parser = pose)]
+    pub initial_estimate: Option<Pose>,
+    /// Time limit, s [default: the world's]
+    #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = positive)]
+    pub time_limit_s: Option<f64>,
+    /// Standard deviation of noisy bearings, degrees [default: 0.3]
+    #[arg(long, value_name = "DEG", allow_negative_numbers = true, value_parser = not_negative)]
+    pub noise_deg: Option<f64>,
+    /// Share of noisy bearings that are missed [default: 0.05]
+    #[arg(long, value_name = "SHARE", allow_negative_numbers = true, value_parser = share)]
+    pub noise_dropout: Option<f64>,
+    /// Share of noisy bearings that are false [default: 0.02]
+    #[arg(long, value_name = "SHARE", allow_negative_numbers = true, value_parser = share)]
+    pub noise_false: Option<f64>,
+    /// Folder for the results [default: results/runs/home-WORLD-SEED]
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+}
+
+/// Arguments of `drive`.
+#[derive(Debug, clap::Args)]
+pub struct DriveArgs {
+    /// World file, or the name of a built-in world
+    pub world: String,
+    /// Table of commands: t_s, v_m_s, omega_rad_s
+    #[arg(long, value_name = "FILE.csv")]
+    pub commands: PathBuf,
+    /// Start: `random`, the name of one of the world's starts, or a pose x,y,heading_deg [default: the world's home]
+    #[arg(long, allow_hyphen_values = true, value_parser = start)]
+    pub start: Option<Start>,
+    /// Seed of the run
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub seed: u64,
+    /// Folder for the results [default: results/runs/drive-WORLD-SEED]
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+}
+
+/// Arguments of `render`.
+#[derive(Debug, clap::Args)]
+pub struct RenderArgs {
+    /// World file, or the name of a built-in world
+    pub world: String,
+    /// Pose of the robot that carries the camera
+    #[arg(long, value_name = "x,y,heading_deg", allow_hyphen_values = true, value_parser = pose)]
+    pub pose: Pose,
+    /// Columns and rows of the panorama, 16x8 to 16384x4096 [default: the world's]
+    #[arg(long, value_name = "WxH", value_parser = size)]
+    pub size: Option<(u32, u32)>,
+    /// What renders
+    #[arg(long, default_value = "auto", value_parser = choice(RENDERERS))]
+    pub renderer: RendererChoice,
+    /// Folder for the results [default: results/runs/render-WORLD]
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+}
+
+/// Arguments of `world`.
+#[derive(Debug, clap::Args)]
+pub struct WorldArgs {
+    #[command(subcommand)]
+    pub command: WorldCommand,
+}
+
+/// The subcommands of `world`.
+#[derive(Debug, Subcommand)]
+pub enum WorldCommand {
+    /// Check a world file and list all its faults
+    Check {
+        /// World file, or the name of a built-in world
+        world: String,
+    },
+    /// Draw a world from above as SVG
+    Plot {
+        /// World file, or the name of a built-in world
+        world: String,
+        /// File for the drawing [default: stdout]
+        #[arg(long, value_name = "FILE")]
+        out: Option<PathBuf>,
+    },
+    /// Print the JSON Schema of world files
+    Schema,
+}
+
+/// A value of the library, what it is called here, and what `--help` says of it.
+type Choice<T> = (T, &'static str, &'static str);
+
+const PLANTS: &[Choice<PlantKind>] = &[
+    (PlantKind::Rapier, "rapier", "Wheels that slip, motors, encoders, collisions"),
+    (PlantKind::Unicycle, "unicycle", "The unicycle's kinematics with perfect odometry; nothing stops it"),
+];
+
+const BEARINGS: &[Choice<Bearings>] = &[
+    (Bearings::Rendered, "rendered", "Features of rendered panoramas, found again from the home panorama"),
+    (Bearings::Ideal, "ideal", "True bearings of the landmark bodies' centres, where nothing hides them"),
+    (Bearings::Noisy, "noisy", "Ideal bearings with noise, drop-outs and false matches"),
+];
+
+const METHODS: &[Choice<MethodKind>] = &[
+    (MethodKind::AnchoredEkf, "anchored-ekf", "Filter that starts from nothing and anchors home when it can"),
+    (MethodKind::PaperEkf, "paper-ekf", "The paper's filter on three landmarks, started at a supposed pose"),
+    (MethodKind::Alv, "alv", "Average landmark vector without a compass; no estimate"),
+];
+
+const LAWS: &[Choice<LawKind>] = &[
+    (LawKind::Proportional, "proportional", "Turn rate proportional to the heading error"),
+    (LawKind::Lyapunov, "lyapunov", "The paper's switching law"),
+];
+
+const RENDERERS: &[Choice<RendererChoice>] = &[
+    (RendererChoice::Auto, "auto", "A hardware GPU where there is one, else the CPU"),
+    (RendererChoice::Gpu, "gpu", "Any graphics adapter, a software one included"),
+    (RendererChoice::Cpu, "cpu", "The CPU"),
+];
+
+/// Reads one of `choices` by its name.
+fn choice<T: Copy + Send + Sync + 'static>(choices: &'static [Choice<T>]) -> impl TypedValueParser<Value = T> {
+    let names = choices.iter().map(|(_, name, help)| PossibleValue::new(*name).help(*help));
+    PossibleValuesParser::new(names)
+        .try_map(|given| choices.iter().find(|(_, name, _)| *name == given).map(|(value, ..)| *value).ok_or("unknown name"))
+}
+
+/// What `--bearings` calls a sensor.
+pub fn bearings_name(bearings: Bearings) -> &'static str {
+    BEARINGS.iter().find(|(value, ..)| *value == bearings).map_or("", |(_, name, _)| name)
+}
+
+/// A finite number.
+fn number(text: &str) -> Result<f64, String> {
+    text.trim().parse().ok().filter(|v: &f64| v.is_finite()).ok_or_else(|| format!("`{text}` is not a finite number"))
+}
+
+fn positive(text: &str) -> Result<f64, String> {
+    number(text).and_then(|v| if v > 0.0 { Ok(v) } else { Err("must be greater than 0".into()) })
+}
+
+fn not_negative(text: &str) -> Result<f64, String> {
+    number(text).and_then(|v| if v >= 0.0 { Ok(v) } else { Err("must not be negative".into()) })
+}
+
+fn share(text: &str) -> Result<f64, String> {
+    number(text).and_then(|v| if (0.0..=1.0).contains(&v) { Ok(v) } else { Err("must be between 0 and 1".into()) })
+}
+
+/// `x,y,heading_deg`.
+fn pose(text: &str) -> Result<Pose, String> {
+    let numbers = text.split(',').map(number).collect::<Result<Vec<_>, _>>()?;
+    let [x, y, heading_deg] = numbers[..] else {
+        return Err(format!("found {} numbers, a pose is three: x,y,heading_deg", numbers.len()));
+    };
+    Ok(Pose::new(x, y, heading_deg.to_radians()))
+}
+
+fn start(text: &str) -> Result<Start, String> {
+    match text {
+        "random" => Ok(Start::Random),
+        _ if text.contains(',') => pose(text).map(Start::At),
+        _ => Ok(Start::Named(text.to_owned())),
+    }
+}
+
+/// `WxH` in pixels.
+fn size(text: &str) -> Result<(u32, u32), String> {
+    let (width, height) = text
+        .split_once('x')
+        .and_then(|(w, h)| Some((w.parse::<u32>().ok()?, h.parse::<u32>().ok()?)))
+        .ok_or("a size is WxH, such as 1440x180")?;
+    if !(16..=16384).contains(&width) || !(8..=4096).contains(&height) {
+        return Err("allowed are widths of 16 to 16384 and heights of 8 to 4096".into());
+    }
+    Ok((width, height))
+}
+
+/// Most seeds of one batch.
+const MOST_SEEDS: u64 = 100_000;
+
+/// `A..B`, both ends included.
+fn seeds(text: &str) -> Result<RangeInclusive<u64>, String> {
+    let (first, last) = text
+        .split_once("..")
+        .and_then(|(a, b)| Some((a.parse::<u64>().ok()?, b.strip_prefix('=').unwrap_or(b).parse::<u64>().ok()?)))
+        .ok_or("seeds are A..B, such as 1..40, both ends included")?;
+    if first > last || last - first >= MOST_SEEDS {
+        return Err(format!("allowed are 1 to {MOST_SEEDS} seeds, the first one not above the last"));
+    }
+    Ok(first..=last)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    #[test]
+    fn the_command_line_is_consistent() {
+        Args::command().debug_assert();
+    }
+
+    #[test]
+    fn choices_are_called_what_files_call_them() {
+        fn check<T: serde::Serialize>(choices: &[Choice<T>]) {
+            for (value, name, _) in choices {
+                assert_eq!(serde_json::to_value(value).unwrap(), *name);
+            }
+        }
+        check(PLANTS);
+        check(BEARINGS);
+        check(METHODS);
+        check(LAWS);
+    }
+
+    #[test]
+    fn values_are_read_and_checked() {
+        assert_eq!(size("1440x180"), Ok((1440, 180)));
+        for bad in ["0x0", "15x180", "1440x4097", "1440", "1440x", "-1x5", "99999999999x8", "1440X180"] {
+            assert!(size(bad).is_err(), "{bad}");
+        }
+        assert_eq!(pose("1, -2,180"), Ok(Pose::new(1.0, -2.0, std::f64::consts::PI)));
+        for bad in ["", "1,2", "1,2,3,4", "1,2,x", "NaN,0,0", "inf,0,0", "1e999,0,0"] {
+            assert!(pose(bad).is_err(), "{bad}");
+        }
+        assert_eq!(seeds("1..40"), Ok(1..=40));
+        assert_eq!(seeds("7..=7"), Ok(7..=7));
+        for bad in ["", "1", "2..1", "..", "0..100000", "-1..3", "0..18446744073709551615"] {
+            assert!(seeds(bad).is_err(), "{bad}");
+        }
+        assert_eq!(start("P1"), Ok(Start::Named("P1".into())));
+        assert!(start("1,2").is_err());
+        assert!(positive("0").is_err() && not_negative("-1").is_err() && share("1.1").is_err());
+    }
+}

@@ -1,0 +1,121 @@
+//! `wayhome home`: one closed-loop run, or one a seed.
+
+use std::ops::{ControlFlow, RangeInclusive};
+use std::sync::Mutex;
+
+use anyhow::Result;
+use serde::Serialize;
+use wayhome::Error;
+use wayhome::episode::sensor::Noise;
+use wayhome::episode::{Bearings, Bench, Outcome, Setup, Summary};
+use wayhome::report::{OutputFolder, run as run_report, seeds as seeds_report, text};
+use wayhome::study::seeds::{SeedEvent, SeedsSummary, run_seeds};
+use wayhome::world::World;
+
+use super::Verdict;
+use super::args::{self, HomeArgs};
+use super::context::{Context, default_folder};
+
+/// What `--json` prints for one run: its summary and where the files are.
+#[derive(Serialize)]
+struct RunOutput<'a> {
+    #[serde(flatten)]
+    summary: &'a Summary,
+    out: String,
+}
+
+/// What `--json` prints for a batch: its summary, those of the runs, and where the files are.
+#[derive(Serialize)]
+struct BatchOutput<'a> {
+    #[serde(flatten)]
+    batch: &'a SeedsSummary,
+    per_seed: &'a [Summary],
+    out: String,
+}
+
+pub fn run(args: &HomeArgs, context: &Context) -> Result<Verdict> {
+    let setup = setup(args)?;
+    let world = World::open(&args.world)?;
+    match &args.seeds {
+        Some(seeds) => batch(args, context, &world, &setup, seeds),
+        None => single(args, context, &world, &setup),
+    }
+}
+
+fn single(args: &HomeArgs, context: &Context, world: &World, setup: &Setup) -> Result<Verdict> {
+    let seed = args.seed.to_string();
+    let out = args.out.clone().unwrap_or_else(|| default_folder(&["home", &world.spec.name, &seed]));
+    setup.start_pose(world, wayhome::random::Seed(args.seed))?; // before a folder is made for a run that cannot start
+    let folder = OutputFolder::open(&out, "home", run_report::FILES)?;
+    let bar = context.progress(None)?;
+    let record = Bench::new(world, setup)?.run(args.seed, &mut |progress| {
+        bar.set_message(format!("{:.1} s, {:.2} m from home", progress.time_s, progress.distance_m));
+        bar.tick();
+        if context.is_stopped() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    })?;
+    bar.finish_and_clear();
+    let summary = Summary::new(&record, world, setup, args.seed);
+    run_report::write(folder, world, &record, &summary)?;
+    let output = RunOutput { summary: &summary, out: out.display().to_string() };
+    context.print(&output, || text::run(&summary, &out))?;
+    Ok(if summary.outcome == Outcome::Home { Verdict::Done } else { Verdict::NotHome })
+}
+
+fn batch(args: &HomeArgs, context: &Context, world: &World, setup: &Setup, seeds: &RangeInclusive<u64>) -> Result<Verdict> {
+    let range = format!("{}..{}", seeds.start(), seeds.end());
+    let out = args.out.clone().unwrap_or_else(|| default_folder(&["home", &world.spec.name, &range]));
+    let folder = OutputFolder::open(&out, "home --seeds", seeds_report::FILES)?;
+    let bar = context.progress(Some(seeds.end() - seeds.start() + 1))?;
+    bar.tick();
+    let home = Mutex::new(0_usize);
+    let watch = |event: SeedEvent<'_>| {
+        if let SeedEvent::Done(summary) = event {
+            if let Ok(mut home) = home.lock() {
+                *home += usize::from(summary.outcome == Outcome::Home);
+                bar.set_message(format!("{home} home"));
+            }
+            bar.inc(1);
+        }
+        if context.is_stopped() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    };
+    let runs = run_seeds(world, setup, seeds.clone(), rayon::current_num_threads(), &watch)?;
+    bar.finish_and_clear();
+    let batch = SeedsSummary::new(&runs, seeds, world, setup);
+    seeds_report::write(folder, &batch, &runs)?;
+    let output = BatchOutput { batch: &batch, per_seed: &runs, out: out.display().to_string() };
+    context.print(&output, || text::seeds(&batch, &runs, &out))?;
+    Ok(Verdict::Done)
+}
+
+/// The setup that the arguments ask for.
+fn setup(args: &HomeArgs) -> Result<Setup, Error> {
+    let noisy = args.noise_deg.is_some() || args.noise_dropout.is_some() || args.noise_false.is_some();
+    needs_bearings(noisy, "--noise-*", args.bearings, Bearings::Noisy)?;
+    needs_bearings(args.size.is_some(), "--size", args.bearings, Bearings::Rendered)?;
+    let usual = Noise::default();
+    Ok(Setup {
+        plant: args.plant,
+        bearings: args.bearings,
+        method: args.method,
+        law: args.controller,
+        renderer: args.renderer,
+        size_px: args.size,
+        noise: Noise {
+            sd_rad: args.noise_deg.map_or(usual.sd_rad, f64::to_radians),
+            dropout: args.noise_dropout.unwrap_or(usual.dropout),
+            false_match: args.noise_false.unwrap_or(usual.false_match),
+        },
+        start: args.start.clone(),
+        initial_estimate: args.initial_estimate,
+        time_limit_s: args.time_limit_s,
+    })
+}
+
+/// Refuses a flag that would do nothing with the sensor that was chosen.
+fn needs_bearings(given: bool, flag: &str, found: Bearings, needed: Bearings) -> Result<(), Error> {
+    if !given || found == needed {
+        return Ok(());
+    }
+    let name = |bearings| format!("--bearings {}", args::bearings_name(bearings));
+    Err(Error::Invalid { what: format!("sensor for {flag}"), found: name(found), allowed: name(needed) })
+}

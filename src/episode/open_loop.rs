@@ -1,0 +1,336 @@
+//! Open loop: a table of commands drives the robot, and nobody looks where it goes.
+//!
+//! [`Commands`] is the table, checked as a whole before anything moves. [`drive`] runs it on a [`RapierPlant`] and keeps truth,
+//! odometry, wheels and floor contacts side by side in a [`DriveRecord`]; [`DriveSummary`] is that in numbers.
+
+use std::ops::ControlFlow;
+use std::path::Path;
+
+use serde::Serialize;
+use sha2::{Digest, Sha256};
+
+use super::summary::{CollisionRecord, PoseRecord};
+use crate::error::{Error, Result};
+use crate::geometry::{Pose, Twist, Vector2, wrap};
+use crate::physics::{Collision, FloorContact, Plant, RapierPlant};
+use crate::random::Seed;
+use crate::world::World;
+
+/// Columns of a command table, in any order.
+const COLUMNS: [&str; 3] = ["t_s", "v_m_s", "omega_rad_s"];
+/// Least time between two rows, s: a substep of the physics.
+const LEAST_INTERVAL_S: f64 = 1e-3;
+/// Most control steps of a table: each is kept until the end.
+const MOST_STEPS: f64 = 1e6;
+/// Greatest speed and turn rate that a table may ask for; what the robot's limits make of it is the robot's business.
+const GREATEST_COMMAND: f64 = 1e3;
+
+/// A checked table of commands. Each row holds from its time until that of the next; the last row is the end, and its command
+/// is never driven.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Commands {
+    rows: Vec<(f64, Twist)>,
+    sha256: String,
+}
+
+impl Commands {
+    /// Reads a table from a CSV file.
+    ///
+    /// # Errors
+    /// When the file cannot be read, and as [`Commands::parse`].
+    pub fn load(path: &Path) -> Result<Self> {
+        let text =
+            std::fs::read_to_string(path).map_err(|source| Error::Io { action: "read", path: path.to_owned(), source })?;
+        Self::parse(&text, path)
+    }
+
+    /// Reads a table from CSV text with the columns `t_s,v_m_s,omega_rad_s`, in any order. `source` names it in messages.
+    ///
+    /// # Errors
+    /// When a column is missing or unknown, a cell is empty or no finite number, a line is blank in between, the times do not
+    /// begin at 0 or do not grow by at least a millisecond, or there are fewer than two rows. The message names line and field.
+    pub fn parse(text: &str, source: &Path) -> Result<Self> {
+        Self::parse_rows(text)
+            .map(|rows| Self { rows, sha256: Sha256::digest(text.as_bytes()).iter().map(|b| format!("{b:02x}")).collect() })
+            .map_err(|message| Error::Parse { path: source.to_owned(), message })
+    }
+
+    fn parse_rows(text: &str) -> std::result::Result<Vec<(f64, Twist)>, String> {
+        let text = text.strip_prefix('\u{feff}').unwrap_or(text).trim_end();
+        let mut lines = text.lines().zip(1..);
+        let (header, _) = lines.next().unwrap_or(("", 1));
+        let names: Vec<&str> = header.split(',').map(str::trim).collect();
+        let wanted = COLUMNS.join(",");
+        if let Some(missing) = COLUMNS.iter().find(|column| !names.contains(column)) {
+            return Err(format!("line 1: found no column `{missing}`, expected the columns {wanted}"));
+        }
+        if let Some(k) = (0..names.len()).find(|&k| !COLUMNS.contains(&names[k]) || names[..k].contains(&names[k])) {
+            return Err(format!("line 1: found `{}` as column {}, expected the columns {wanted}, each once", names[k], k + 1));
+        }
+        let mut rows: Vec<(f64, Twist)> = Vec::new();
+        for (line, number) in lines {
+            let fault = |field: &str, found: &str, allowed: &str| {
+                Err(format!("line {number}, {field}: found {found}, allowed is {allowed}"))
+            };
+            let cells: Vec<&str> = line.split(',').map(str::trim).collect();
+            if cells.len() != names.len() {
+                let found = if line.trim().is_empty() { "a blank line".to_owned() } else { format!("{} cells", cells.len()) };
+                return fault("row", &found, "3 cells in every row up to the last");
+            }
+            let mut values = [0.0; 3];
+            for (name, cell) in names.iter().zip(&cells) {
+                let value = cell.parse::<f64>().ok().filter(|value| value.is_finite());
+                let (Some(value), Some(k)) = (value, COLUMNS.iter().position(|column| column == name)) else {
+                    let found = if cell.is_empty() { "an empty cell".to_owned() } else { format!("`{cell}`") };
+                    return fault(name, &found, "a finite number");
+                };
+                if k > 0 && value.abs() > GREATEST_COMMAND {
+                    return fault(name, cell, &format!("-{GREATEST_COMMAND} to {GREATEST_COMMAND}"));
+                }
+                values[k] = value;
+            }
+            let [time_s, v, omega] = values;
+            match rows.last() {
+                None if time_s != 0.0 => return fault("t_s", &time_s.to_string(), "0 in the first row"),
+                Some((before, _)) if time_s - before < LEAST_INTERVAL_S * (1.0 - 1e-9) => {
+                    let allowed = format!("at least {LEAST_INTERVAL_S} more than {before}, the time of the row before");
+                    return fault("t_s", &time_s.to_string(), &allowed);
+                }
+                _ => rows.push((time_s, Twist { v, omega })),
+            }
+        }
+        if rows.len() < 2 {
+            return Err(format!("found {} rows, expected at least 2: the last one only says when the drive ends", rows.len()));
+        }
+        Ok(rows)
+    }
+
+    /// Time of the last row, s.
+    #[must_use]
+    pub fn duration_s(&self) -> f64 {
+        self.rows.last().map_or(0.0, |(time_s, _)| *time_s)
+    }
+
+    /// The intervals of at most `longest_s` that the table is driven in: their ends, their lengths, and the command held.
+    fn intervals(&self, longest_s: f64) -> impl Iterator<Item = (f64, f64, Twist)> + '_ {
+        self.rows.windows(2).flat_map(move |pair| {
+            let ((from, twist), (to, _)) = (pair[0], pair[1]);
+            let count = libm::ceil((to - from) / longest_s - 1e-9).max(1.0);
+            let length = (to - from) / count;
+            (1..=count as u64).map(move |k| (from + k as f64 * length, length, twist))
+        })
+    }
+}
+
+/// State at the end of an interval of a drive.
+#[derive(Debug, Clone, Copy)]
+pub struct DriveStep {
+    /// Time since the start, s.
+    pub time_s: f64,
+    /// Command held during the interval that ends here.
+    pub command: Twist,
+    /// True pose in the room.
+    pub truth: Pose,
+    /// True velocity of the middle of the axle, forward and leftward, m/s.
+    pub velocity_m_s: Vector2<f64>,
+    /// True yaw rate, rad/s.
+    pub yaw_rate_rad_s: f64,
+    /// Pose that the odometry alone leads to, in the room, from the true start.
+    pub dead_reckoned: Pose,
+    /// Odometry of the interval.
+    pub odometry: Twist,
+    /// True speeds of the left and right wheel, rad/s.
+    pub wheel_speeds_rad_s: [f64; 2],
+    /// Slip, forces and loads, means over the interval.
+    pub floor: FloorContact,
+    /// Collisions that began during the interval.
+    pub collisions: u32,
+}
+
+/// A drive from its start to its end.
+#[derive(Debug, Clone)]
+pub struct DriveRecord {
+    /// States, from the start on. Never empty.
+    pub steps: Vec<DriveStep>,
+    /// Collisions as they began.
+    pub collisions: Vec<Collision>,
+}
+
+impl DriveRecord {
+    /// The state at the end.
+    #[must_use]
+    pub fn last(&self) -> &DriveStep {
+        &self.steps[self.steps.len() - 1]
+    }
+}
+
+/// Drives `commands` from `start` in `world`, with a state at least every control period of the world's task. `watch` is called
+/// with each state and stops the drive with `Break`.
+///
+/// # Errors
+/// [`Error::Invalid`] when the table is too long to be kept, [`Error::Interrupted`] when `watch` breaks.
+pub fn drive(
+    world: &World,
+    start: Pose,
+    seed: Seed,
+    commands: &Commands,
+    watch: &mut dyn FnMut(&DriveStep) -> ControlFlow<()>,
+) -> Result<DriveRecord> {
+    let period_s = world.spec.task.control_period_s;
+    if commands.duration_s() / period_s + commands.rows.len() as f64 > MOST_STEPS {
+        return Err(Error::Invalid {
+            what: "duration of the commands".into(),
+            found: format!("{} s", commands.duration_s()),
+            allowed: format!("{MOST_STEPS} control steps of {period_s} s at most"),
+        });
+    }
+    let mut plant = RapierPlant::new(world, start, seed);
+    let first = DriveStep {
+        time_s: 0.0,
+        command: Twist::default(),
+        truth: start,
+        velocity_m_s: Vector2::zeros(),
+        yaw_rate_rad_s: 0.0,
+        dead_reckoned: start,
+        odometry: Twist::default(),
+        wheel_speeds_rad_s: [0.0; 2],
+        floor: FloorContact { load_n: plant.chassis().loads(), ..FloorContact::default() },
+        collisions: 0,
+    };
+    let mut record = DriveRecord { steps: vec![first], collisions: Vec::new() };
+    for (time_s, length_s, command) in commands.intervals(period_s) {
+        let moved = plant.step(command, length_s);
+        let chassis = plant.chassis();
+        let step = DriveStep {
+            time_s,
+            command,
+            truth: plant.truth(),
+            velocity_m_s: chassis.axle_velocity(),
+            yaw_rate_rad_s: chassis.velocity().yaw_rate,
+            dead_reckoned: record.last().dead_reckoned.advanced(moved.odometry.twist, moved.odometry.dt_s),
+            odometry: moved.odometry.twist,
+            wheel_speeds_rad_s: chassis.wheel_speeds(),
+            floor: *plant.floor_contact(),
+            collisions: moved.collisions,
+        };
+        record.collisions.extend_from_slice(plant.collisions());
+        record.steps.push(step);
+        if watch(&step).is_break() {
+            return Err(Error::Interrupted);
+        }
+    }
+    Ok(record)
+}
+
+/// A drive in numbers. Depends on the world, the commands, the start and the seed alone.
+#[derive(Debug, Clone, Serialize)]
+pub struct DriveSummary {
+    /// How long it took, s.
+    pub time_s: f64,
+    /// True pose at the start, in the room.
+    pub start: PoseRecord,
+    /// True pose at the end.
+    pub end: PoseRecord,
+    /// Pose at the end by odometry alone.
+    pub odometry_end: PoseRecord,
+    /// Distance at the end between odometry and truth, m.
+    pub odometry_drift_m: f64,
+    /// Difference of heading at the end, odometry less truth, rad.
+    pub odometry_heading_drift_rad: f64,
+    /// Length of the true path, m.
+    pub path_length_m: f64,
+    /// Greatest true speed of the axle, m/s.
+    pub greatest_speed_m_s: f64,
+    /// Greatest mean slip speed of a wheel over an interval, m/s.
+    pub greatest_slip_m_s: f64,
+    /// Contacts with walls and bodies.
+    pub collisions: usize,
+    /// Each of them.
+    pub collision_list: Vec<CollisionRecord>,
+    /// Seed of the run.
+    pub seed: u64,
+    /// Name of the world.
+    pub world: String,
+    /// SHA-256 of the world file.
+    pub world_sha256: String,
+    /// SHA-256 of the command table.
+    pub commands_sha256: String,
+    /// Version of this program.
+    pub version: &'static str,
+}
+
+impl DriveSummary {
+    /// What a drive came to.
+    #[must_use]
+    pub fn new(record: &DriveRecord, world: &World, commands: &Commands, seed: u64) -> Self {
+        let (start, end) = (&record.steps[0], record.last());
+        let greatest = |of: &dyn Fn(&DriveStep) -> f64| record.steps.iter().map(of).fold(0.0, f64::max);
+        Self {
+            time_s: end.time_s,
+            start: start.truth.into(),
+            end: end.truth.into(),
+            odometry_end: end.dead_reckoned.into(),
+            odometry_drift_m: (end.dead_reckoned.position() - end.truth.position()).norm(),
+            odometry_heading_drift_rad: wrap(end.dead_reckoned.heading - end.truth.heading),
+            path_length_m: record.steps.windows(2).map(|w| (w[1].truth.position() - w[0].truth.position()).norm()).sum(),
+            greatest_speed_m_s: greatest(&|s| s.velocity_m_s.norm()),
+            greatest_slip_m_s: greatest(&|s| s.floor.slip_m_s[0].norm().max(s.floor.slip_m_s[1].norm())),
+            collisions: record.collisions.len(),
+            collision_list: CollisionRecord::list(&record.collisions, world),
+            seed,
+            world: world.spec.name.clone(),
+            world_sha256: world.sha256.clone(),
+            commands_sha256: commands.sha256.clone(),
+            version: env!("CARGO_PKG_VERSION"),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parse(text: &str) -> std::result::Result<Commands, String> {
+        Commands::parse(text, Path::new("c.csv")).map_err(|e| e.to_string())
+    }
+
+    #[test]
+    fn a_table_is_cut_into_intervals_that_end_at_its_rows() {
+        let commands = parse("omega_rad_s, t_s, v_m_s\r\n0,0,0.3\r\n1,0.25,0\r\n0,0.4,0\r\n\r\n").unwrap();
+        let intervals: Vec<_> = commands.intervals(0.1).collect();
+        assert_eq!(intervals.len(), 5);
+        assert!((intervals.iter().map(|(_, length, _)| length).sum::<f64>() - 0.4).abs() < 1e-15);
+        assert_eq!((intervals[2].0, intervals[2].2), (0.25, Twist { v: 0.3, omega: 0.0 }));
+        assert_eq!((intervals[4].0, intervals[4].2), (0.4, Twist { v: 0.0, omega: 1.0 }));
+    }
+
+    #[test]
+    fn bad_tables_are_refused_by_line_and_field() {
+        let header = "t_s,v_m_s,omega_rad_s\n";
+        for (rows, words) in [
+            ("0,0,0\n1,NaN,0\n", ["line 3", "v_m_s", "NaN"]),
+            ("0,0,0\n1,0,inf\n", ["line 3", "omega_rad_s", "inf"]),
+            ("0,0,0\n1,,0\n", ["line 3", "v_m_s", "empty cell"]),
+            ("0,0,0\n\n1,0,0\n", ["line 3", "row", "blank line"]),
+            ("0,0,0\n1,0\n", ["line 3", "row", "2 cells"]),
+            ("0,0,0\n2,0,0\n1,0,0\n", ["line 4", "t_s", "found 1"]),
+            ("0,0,0\n0,0,0\n", ["line 3", "t_s", "found 0"]),
+            ("0.5,0,0\n1,0,0\n", ["line 2", "t_s", "0 in the first row"]),
+            ("0,fast,0\n1,0,0\n", ["line 2", "v_m_s", "`fast`"]),
+            ("0,1e9,0\n1,0,0\n", ["line 2", "v_m_s", "1000"]),
+            ("0,0,0\n", ["found 1 rows", "at least 2", "c.csv"]),
+        ] {
+            let message = parse(&format!("{header}{rows}")).unwrap_err();
+            assert!(words.iter().all(|word| message.contains(word)), "{words:?} in: {message}");
+        }
+        for (header, word) in [
+            ("t_s,v_m_s", "omega_rad_s"),
+            ("", "t_s"),
+            ("t_s,v_m_s,omega_rad_s,note", "note"),
+            ("t_s,v_m_s,v_m_s", "omega_rad_s"),
+        ] {
+            let message = parse(&format!("{header}\n0,0,0\n1,0,0\n")).unwrap_err();
+            assert!(message.contains("line 1") && message.contains(word), "{message}");
+        }
+    }
+}

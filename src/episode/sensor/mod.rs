@@ -1,0 +1,62 @@
+//! Sensors of bearings: where the truth becomes an observation.
+//!
+//! A sensor belongs to the simulator, so it sees the true poses; what it gives to the method are bearings only. Three kinds:
+//! [`RenderedSensor`] looks through the camera and the feature extractor, [`IdealSensor`] takes the bearings of the landmark
+//! bodies from geometry, and [`NoisySensor`] spoils those with noise, drop-outs and false matches.
+
+mod ideal;
+mod noisy;
+mod rendered;
+mod sight;
+
+pub use ideal::IdealSensor;
+pub use noisy::{Noise, NoisySensor};
+pub use rendered::RenderedSensor;
+
+use crate::error::Result;
+use crate::geometry::Pose;
+use crate::observation::{Bearing, HomeSnapshot};
+use crate::panorama::Panorama;
+use crate::render::RendererInfo;
+
+/// A source of bearings. The home snapshot is taken when the sensor is built, with all bodies where they stand at time 0.
+pub trait Sensor {
+    /// What was seen at home.
+    fn home(&self) -> &HomeSnapshot;
+
+    /// Bearings from the true pose `truth` in the room, with the bodies at `bodies` in the order of `World::bodies`. Each id
+    /// comes at most once.
+    ///
+    /// # Errors
+    /// When a renderer fails.
+    fn observe(&mut self, truth: Pose, bodies: &[Pose]) -> Result<Vec<Bearing>>;
+
+    /// The panorama from home, where the sensor has a camera.
+    fn home_panorama(&self) -> Option<&Panorama> {
+        None
+    }
+
+    /// The last panorama seen, where the sensor has a camera.
+    fn panorama(&self) -> Option<&Panorama> {
+        None
+    }
+
+    /// What renders, where the sensor has a camera.
+    fn renderer(&self) -> Option<&RendererInfo> {
+        None
+    }
+
+    /// Wall-clock time spent in `observe` so far.
+    fn timing(&self) -> SensorTiming {
+        SensorTiming::default()
+    }
+}
+
+/// Wall-clock time that a sensor has taken.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct SensorTiming {
+    /// Rendering, s.
+    pub render_s: f64,
+    /// Turning panoramas into bearings, s.
+    pub vision_s: f64,
+}

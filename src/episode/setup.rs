@@ -1,0 +1,218 @@
+//! Choosing the parts of an episode and putting them together.
+
+use std::ops::ControlFlow;
+use std::sync::Arc;
+
+use serde::Serialize;
+
+use super::method::{self, LawKind, MethodKind};
+use super::record::Record;
+use super::run::{Parts, Progress, run};
+use super::sensor::{IdealSensor, Noise, NoisySensor, RenderedSensor, Sensor};
+use crate::error::{Error, Result};
+use crate::geometry::Pose;
+use crate::observation::{Briefing, RobotSheet, TaskSheet};
+use crate::panorama::Projection;
+use crate::physics::{Plant, RapierPlant, UnicyclePlant};
+use crate::random::Seed;
+use crate::render::{self, Renderer, RendererChoice, Scene};
+use crate::vision::ExtractorSettings;
+use crate::world::{TaskSpec, World};
+
+/// What moves when the wheels are commanded.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum PlantKind {
+    /// Wheels that slip, motors, encoders, collisions.
+    Rapier,
+    /// The unicycle's kinematics with perfect odometry; walls and bodies do not stop it.
+    Unicycle,
+}
+
+/// Where bearings come from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Bearings {
+    /// Features of rendered panoramas, matched to those of the home panorama.
+    Rendered,
+    /// True bearings of the landmark bodies' centres, hidden by what stands in between.
+    Ideal,
+    /// Ideal bearings with noise, drop-outs and false matches.
+    Noisy,
+}
+
+/// Where a run starts.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Start {
+    /// Drawn from the world's start region with the run's seed.
+    Random,
+    /// A start that the world names.
+    Named(String),
+    /// A pose in the room.
+    At(Pose),
+}
+
+/// The parts and settings of an episode, all but the world and the seed.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Setup {
+    /// What moves.
+    pub plant: PlantKind,
+    /// What senses.
+    pub bearings: Bearings,
+    /// What decides.
+    pub method: MethodKind,
+    /// How it steers.
+    pub law: LawKind,
+    /// What renders, for [`Bearings::Rendered`].
+    pub renderer: RendererChoice,
+    /// Columns and rows of the panorama where they differ from the world's.
+    pub size_px: Option<(u32, u32)>,
+    /// Faults of [`Bearings::Noisy`].
+    pub noise: Noise,
+    /// Where runs start.
+    pub start: Start,
+    /// Pose in the home frame that a method starts from which wants one.
+    pub initial_estimate: Option<Pose>,
+    /// Time limit where it differs from the world's, s.
+    pub time_limit_s: Option<f64>,
+}
+
+impl Default for Setup {
+    fn default() -> Self {
+        Self {
+            plant: PlantKind::Rapier,
+            bearings: Bearings::Rendered,
+            method: MethodKind::AnchoredEkf,
+            law: LawKind::Proportional,
+            renderer: RendererChoice::Auto,
+            size_px: None,
+            noise: Noise::default(),
+            start: Start::Random,
+            initial_estimate: None,
+            time_limit_s: None,
+        }
+    }
+}
+
+impl Setup {
+    /// The world's task with this setup's time limit.
+    #[must_use]
+    pub fn task(&self, world: &World) -> TaskSpec {
+        let task = world.spec.task;
+        TaskSpec { time_limit_s: self.time_limit_s.unwrap_or(task.time_limit_s), ..task }
+    }
+
+    /// The camera's projection in this setup.
+    #[must_use]
+    pub fn projection(&self, world: &World) -> Projection {
+        self.size_px.map_or_else(|| world.projection(), |(width, height)| world.projection_of_size(width, height))
+    }
+
+    /// The start pose in the room of the run with `seed`, checked to be free.
+    ///
+    /// # Errors
+    /// When the world has no such start, or the robot cannot stand there.
+    pub fn start_pose(&self, world: &World, seed: Seed) -> Result<Pose> {
+        let pose = match &self.start {
+            Start::Random => return world.random_start(&mut seed.stream("start")),
+            Start::Named(name) => world.named_start(name)?,
+            Start::At(pose) => *pose,
+        };
+        world.is_free(&pose, 0.0, &world.body_poses()).map_err(|reason| Error::Invalid {
+            what: "start".into(),
+            found: format!("({}, {}) m, where {reason} is in the way", pose.x, pose.y),
+            allowed: format!("a place in world `{}` where the robot can stand", world.spec.name),
+        })?;
+        Ok(pose)
+    }
+}
+
+/// A world made ready to run episodes of one setup on it, one after the other.
+pub struct Bench<'a> {
+    world: &'a World,
+    setup: &'a Setup,
+    camera: Option<Camera>,
+}
+
+/// What rendered bearings need, kept from run to run.
+struct Camera {
+    scene: Arc<Scene>,
+    renderer: Box<dyn Renderer>,
+}
+
+impl<'a> Bench<'a> {
+    /// Packs the world and opens the renderer where the setup needs them.
+    ///
+    /// # Errors
+    /// When the world cannot be packed or the renderer cannot be had.
+    pub fn new(world: &'a World, setup: &'a Setup) -> Result<Self> {
+        let camera = match setup.bearings {
+            Bearings::Rendered => {
+                Some(Camera { scene: Arc::new(Scene::new(world)?), renderer: render::create(setup.renderer)? })
+            }
+            Bearings::Ideal | Bearings::Noisy => None,
+        };
+        Ok(Self { world, setup, camera })
+    }
+
+    /// A second bench for another thread; it shares the packed world and has a renderer of its own.
+    ///
+    /// # Errors
+    /// When a second renderer cannot be had.
+    pub fn another(&self) -> Result<Self> {
+        let camera = match &self.camera {
+            Some(camera) => Some(Camera { scene: Arc::clone(&camera.scene), renderer: render::create(self.setup.renderer)? }),
+            None => None,
+        };
+        Ok(Self { camera, ..*self })
+    }
+
+    /// Runs the episode of one seed. `watch` is called once a control step and stops the run with `Break`.
+    ///
+    /// # Errors
+    /// When there is no such start, the method cannot be built from what the setup gives it, the renderer fails, or `watch`
+    /// breaks.
+    pub fn run(&mut self, seed: u64, watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>) -> Result<Record> {
+        let (world, setup, seed) = (self.world, self.setup, Seed(seed));
+        let start = setup.start_pose(world, seed)?;
+        let mut plant: Box<dyn Plant> = match setup.plant {
+            PlantKind::Rapier => Box::new(RapierPlant::new(world, start, seed)),
+            PlantKind::Unicycle => Box::new(UnicyclePlant::new(world, start, seed)),
+        };
+        let ideal = || IdealSensor::new(world);
+        let mut sensor: Box<dyn Sensor + '_> = match &mut self.camera {
+            Some(camera) => Box::new(RenderedSensor::new(
+                world,
+                &camera.scene,
+                camera.renderer.as_mut(),
+                setup.projection(world),
+                ExtractorSettings::default(),
+            )?),
+            None if setup.bearings == Bearings::Noisy => {
+                Box::new(NoisySensor::new(ideal(), world.landmark_count, setup.noise, seed))
+            }
+            None => Box::new(ideal()),
+        };
+        let task = setup.task(world);
+        let briefing = Briefing { home: sensor.home().clone(), robot: robot_sheet(world), task: task_sheet(&task) };
+        let mut method = method::build(setup.method, setup.law, briefing, setup.initial_estimate)?;
+        let parts = Parts { plant: plant.as_mut(), sensor: sensor.as_mut(), method: method.as_mut() };
+        run(parts, world.home, &task, watch)
+    }
+}
+
+/// What a method is told about the robot.
+fn robot_sheet(world: &World) -> RobotSheet {
+    let robot = &world.spec.robot;
+    RobotSheet {
+        track_m: robot.track_m,
+        max_speed_m_s: robot.max_speed_m_s,
+        max_turn_rate_rad_s: robot.max_turn_rate_rad_s,
+        max_acceleration_m_s2: robot.max_acceleration_m_s2,
+    }
+}
+
+/// What a method is told about the task.
+fn task_sheet(task: &TaskSpec) -> TaskSheet {
+    TaskSheet { speed_m_s: task.speed_m_s, control_period_s: task.control_period_s, arrival_radius_m: task.arrival_radius_m }
+}

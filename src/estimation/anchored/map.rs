@@ -1,0 +1,289 @@
+//! The map that both stages of the anchored filter use: the robot's pose and bearing-only landmarks, all anchored at one frame.
+//!
+//! The state is the robot's pose (x, y, heading) in the anchor frame, then for each landmark its direction from the anchor's
+//! origin and its inverse range from there (inverse-depth parametrisation of Civera, Davison and Montiel, 2008): a landmark at
+//! unknown, even infinite, range is then still a Gaussian. A landmark in direction d at inverse range rho is seen from a robot
+//! at p with heading phi at
+//!
+//! atan2(g) - phi, g = (cos d, sin d) - rho p.
+
+use std::collections::BTreeMap;
+
+use nalgebra::{DMatrix, DVector, Matrix2, Matrix3};
+
+use super::FilterSettings;
+use super::motion::Motion;
+use crate::estimation::gaussian::{Gaussian, Linearised, SparseRow};
+use crate::geometry::{Pose, atan2, direction, sin_cos, wrap};
+use crate::observation::{Bearing, Estimate, LandmarkId};
+
+/// First landmark component.
+const LANDMARKS: usize = 3;
+/// Steps for which a landmark is ignored after it was dropped for not fitting.
+const BAN_STEPS: u64 = 25;
+/// A landmark unseen for this many steps makes way when another wants its place.
+const STALE_STEPS: u64 = 10;
+/// Strikes after which a landmark is dropped; a bearing that fits takes one back.
+const STRIKES: u32 = 3;
+/// Inverse ranges outside of this are no landmark's, 1/m: nearer than 5 cm, or clearly beyond infinity.
+const INVERSE_RANGES: std::ops::Range<f64> = -0.3..20.0;
+
+/// Direction (rad) and inverse range (1/m) of a landmark from the anchor, with variances: what is known before it is seen.
+#[derive(Debug, Clone, Copy)]
+pub struct Prior {
+    /// Mean of (direction, inverse range).
+    pub mean: [f64; 2],
+    /// Their variances.
+    pub variance: [f64; 2],
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Landmark {
+    id: LandmarkId,
+    last_seen: u64,
+    strikes: u32,
+}
+
+/// What a measurement update did.
+#[derive(Debug, Clone, Default)]
+pub struct Update {
+    /// Bearings that updated the belief.
+    pub used: Vec<Bearing>,
+    /// Bearings refused by the gate.
+    pub rejected: usize,
+    /// Bearings of landmarks that are ignored because they did not fit before.
+    pub banned: usize,
+    /// Bearings of landmarks that the map does not hold and has not banned.
+    pub strangers: Vec<Bearing>,
+    /// Normalised innovation squared of the used bearings, all together.
+    pub nis: f64,
+}
+
+/// Pose and landmarks in one anchor frame.
+#[derive(Debug, Clone)]
+pub struct Map {
+    belief: Gaussian,
+    landmarks: Vec<Landmark>,
+    banned: BTreeMap<LandmarkId, u64>,
+    step: u64,
+}
+
+/// Bearing of a landmark from a pose with its derivatives by (x, y, heading, direction, inverse range).
+#[must_use]
+pub fn predict_bearing(pose: &Pose, direction_rad: f64, inverse_range: f64) -> (f64, [f64; 5]) {
+    let (s, c) = sin_cos(direction_rad);
+    let (gx, gy) = (c - inverse_range * pose.x, s - inverse_range * pose.y);
+    // g vanishes where the robot stands on the landmark; the derivative is held finite there.
+    let n = (gx * gx + gy * gy).max(1e-9);
+    let (qx, qy) = (-gy / n, gx / n);
+    let by_pose = [-inverse_range * qx, -inverse_range * qy, -1.0];
+    let by_landmark = [-qx * s + qy * c, -(qx * pose.x + qy * pose.y)];
+    (atan2(gy, gx) - pose.heading, [by_pose[0], by_pose[1], by_pose[2], by_landmark[0], by_landmark[1]])
+}
+
+impl Map {
+    /// An empty map with the robot at the anchor, exactly.
+    #[must_use]
+    pub fn at_anchor() -> Self {
+        Self { belief: Gaussian::diagonal(&[0.0; 3], &[0.0; 3]), landmarks: Vec::new(), banned: BTreeMap::new(), step: 0 }
+    }
+
+    /// A map with given landmarks: `mean` and `covariance` of (pose, landmarks in the order of `ids`).
+    #[must_use]
+    pub fn from_solution(ids: &[LandmarkId], mean: DVector<f64>, covariance: DMatrix<f64>) -> Self {
+        let landmarks = ids.iter().map(|&id| Landmark { id, last_seen: 0, strikes: 0 }).collect();
+        Self { belief: Gaussian { mean, covariance }, landmarks, banned: BTreeMap::new(), step: 0 }
+    }
+
+    /// Takes over a solution for the landmarks `ids`, a part of this map's own in the same order; the others are dropped.
+    pub fn replace(&mut self, ids: &[LandmarkId], mean: DVector<f64>, covariance: DMatrix<f64>) {
+        let dropped: Vec<LandmarkId> = self.ids().filter(|id| !ids.contains(id)).collect();
+        for id in dropped {
+            self.banned.insert(id, self.step + BAN_STEPS);
+        }
+        self.landmarks.retain(|l| ids.contains(&l.id));
+        self.belief = Gaussian { mean, covariance };
+    }
+
+    /// The robot's pose.
+    #[must_use]
+    pub fn pose(&self) -> Pose {
+        Pose::new(self.belief.mean[0], self.belief.mean[1], self.belief.mean[2])
+    }
+
+    /// The robot's pose with its covariance.
+    #[must_use]
+    pub fn estimate(&self) -> Estimate {
+        Estimate { pose: self.pose(), covariance: self.belief.covariance.fixed_view::<3, 3>(0, 0).into_owned() }
+    }
+
+    /// Ids of the landmarks, in the order of the state.
+    pub fn ids(&self) -> impl Iterator<Item = LandmarkId> + '_ {
+        self.landmarks.iter().map(|l| l.id)
+    }
+
+    /// (direction, inverse range) of landmark `k` and their covariance.
+    #[must_use]
+    pub fn landmark(&self, k: usize) -> ([f64; 2], Matrix2<f64>) {
+        let c = LANDMARKS + 2 * k;
+        let covariance = self.belief.covariance.fixed_view::<2, 2>(c, c).into_owned();
+        ([self.belief.mean[c], self.belief.mean[c + 1]], covariance)
+    }
+
+    /// Number of landmarks.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.landmarks.len()
+    }
+
+    /// Whether there is no landmark.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.landmarks.is_empty()
+    }
+
+    /// How many landmarks were seen, and fitted, in the last update.
+    #[must_use]
+    pub fn seen_now(&self) -> usize {
+        self.landmarks.iter().filter(|l| l.last_seen == self.step).count()
+    }
+
+    /// Time update.
+    pub fn predict(&mut self, motion: &Motion) {
+        let before = self.pose();
+        let after = before.compose(&motion.delta);
+        let moved = after.position() - before.position();
+        let f = Matrix3::new(1.0, 0.0, -moved.y, 0.0, 1.0, moved.x, 0.0, 0.0, 1.0);
+        let (s, c) = sin_cos(before.heading);
+        let turn = Matrix3::new(c, -s, 0.0, s, c, 0.0, 0.0, 0.0, 1.0);
+        self.belief.propagate_pose(&f, &(turn * motion.covariance * turn.transpose()));
+        self.belief.mean[0] = after.x;
+        self.belief.mean[1] = after.y;
+        self.belief.mean[2] = after.heading;
+    }
+
+    /// Measurement update with the landmarks that the map holds; gates each bearing, iterates, drops landmarks that keep failing.
+    pub fn update(&mut self, bearings: &[Bearing], settings: &FilterSettings, iterations: usize) -> Update {
+        self.step += 1;
+        let mut update = Update::default();
+        let index: BTreeMap<LandmarkId, usize> = self.landmarks.iter().enumerate().map(|(k, l)| (l.id, k)).collect();
+        let mut members = Vec::new();
+        for bearing in bearings {
+            if !(bearing.azimuth_rad.is_finite() && bearing.sd_rad.is_finite()) {
+                update.rejected += 1;
+                continue;
+            }
+            let Some(&k) = index.get(&bearing.id) else {
+                if self.banned.get(&bearing.id).is_none_or(|&until| until < self.step) {
+                    update.strangers.push(*bearing);
+                } else {
+                    update.banned += 1;
+                }
+                continue;
+            };
+            if self.fits(k, bearing, settings.gate) {
+                members.push((k, *bearing));
+                update.used.push(*bearing);
+                self.landmarks[k].last_seen = self.step;
+                self.landmarks[k].strikes = self.landmarks[k].strikes.saturating_sub(1);
+            } else {
+                update.rejected += 1;
+                self.landmarks[k].strikes += 1;
+            }
+        }
+        match self.belief.update_iterated(iterations, |x| members.iter().map(|(k, b)| linearise(x, *k, b)).collect()) {
+            Some(nis) => update.nis = nis,
+            None => update.used.clear(),
+        }
+        self.belief.mean[2] = wrap(self.belief.mean[2]);
+        for k in (0..self.landmarks.len()).rev() {
+            let inverse_range = self.belief.mean[LANDMARKS + 2 * k + 1];
+            if self.landmarks[k].strikes >= STRIKES || !INVERSE_RANGES.contains(&inverse_range) {
+                self.ban(self.landmarks[k].id, BAN_STEPS);
+            }
+        }
+        update
+    }
+
+    fn fits(&self, k: usize, bearing: &Bearing, gate: f64) -> bool {
+        let m = linearise(&self.belief.mean, k, bearing);
+        m.innovation * m.innovation <= gate * (self.belief.variance_along(&m.row) + m.variance)
+    }
+
+    /// Adds a landmark with its prior and its first bearing; `false`, and no change, where the two do not fit.
+    pub fn add(&mut self, prior: &Prior, bearing: &Bearing, settings: &FilterSettings) -> bool {
+        let k = self.landmarks.len();
+        self.belief.append(&prior.mean, &prior.variance);
+        self.landmarks.push(Landmark { id: bearing.id, last_seen: self.step, strikes: 0 });
+        let fits = self.fits(k, bearing, settings.gate)
+            && self.belief.update_iterated(3, |x| vec![linearise(x, k, bearing)]).is_some();
+        if !fits {
+            self.drop_landmark(k);
+            self.banned.insert(bearing.id, self.step + 3);
+        }
+        fits
+    }
+
+    /// Places for new landmarks, after stale ones made way for up to `wanted`.
+    pub fn make_room(&mut self, wanted: usize, limit: usize) -> usize {
+        for k in (0..self.landmarks.len()).rev() {
+            if limit.saturating_sub(self.landmarks.len()) >= wanted {
+                break;
+            }
+            if self.landmarks[k].last_seen + STALE_STEPS < self.step {
+                self.drop_landmark(k);
+            }
+        }
+        limit.saturating_sub(self.landmarks.len())
+    }
+
+    /// Drops a landmark and ignores it for a number of steps.
+    pub fn ban(&mut self, id: LandmarkId, steps: u64) {
+        self.banned.insert(id, self.step + steps);
+        if let Some(k) = self.landmarks.iter().position(|l| l.id == id) {
+            self.drop_landmark(k);
+        }
+    }
+
+    fn drop_landmark(&mut self, k: usize) {
+        self.belief.remove(LANDMARKS + 2 * k, 2);
+        self.landmarks.remove(k);
+    }
+
+    /// Prior of a landmark whose direction from the anchor is known (from the snapshot) and that is now seen from the robot:
+    /// its inverse range is started at the crossing of both rays, where that is well defined. `None` where the rays cannot
+    /// come from one point.
+    #[must_use]
+    pub fn triangulated_prior(&self, from_anchor: &Bearing, now: &Bearing, settings: &FilterSettings) -> Option<Prior> {
+        let estimate = self.estimate();
+        let pose = estimate.pose;
+        let out = direction(from_anchor.azimuth_rad);
+        let ray = direction(pose.heading + now.azimuth_rad);
+        // out - rho p must be parallel to the ray, and point along it.
+        let across = crate::geometry::cross(ray, pose.position());
+        let noise = now.sd_rad + from_anchor.sd_rad + estimate.covariance[(2, 2)].max(0.0).sqrt();
+        let sd = (noise + settings.inverse_range_mean * estimate.position_sd_m()) / across.abs().max(1e-9);
+        let mut inverse_range = settings.inverse_range_mean;
+        if sd < 0.5 * settings.inverse_range_sd {
+            let crossing = crate::geometry::cross(ray, out) / across;
+            if crossing < -3.0 * sd - 0.02 || crossing > 10.0 {
+                return None;
+            }
+            inverse_range = crossing.max(0.02);
+        }
+        if (out - pose.position() * inverse_range).dot(&ray) <= 0.0 {
+            return None;
+        }
+        Some(settings.prior(from_anchor, inverse_range))
+    }
+}
+
+fn linearise(x: &DVector<f64>, k: usize, bearing: &Bearing) -> Linearised {
+    let c = LANDMARKS + 2 * k;
+    let (predicted, d) = predict_bearing(&Pose { x: x[0], y: x[1], heading: x[2] }, x[c], x[c + 1]);
+    let mut row = SparseRow::default();
+    for (column, derivative) in [0, 1, 2, c, c + 1].into_iter().zip(d) {
+        row.push(column, derivative);
+    }
+    Linearised { innovation: wrap(bearing.azimuth_rad - predicted), row, variance: bearing.sd_rad * bearing.sd_rad }
+}

@@ -1,0 +1,464 @@
+//! The anchored filter: finds home from bearings and odometry when nothing is known at the start.
+//!
+//! It runs in two stages, both on the same kind of [`map`]: the robot's pose and bearing-only landmarks, anchored at one frame.
+//!
+//! 1. **Search.** The anchor is where the robot stands at first, so its pose is known exactly there and nothing else is. As it
+//!    moves, odometry gives the landmarks their ranges. In every step [`super::resection`] asks which home poses explain the
+//!    snapshot; the best one says where to drive from the first second on.
+//! 2. **Homing.** Once that answer is sharp and without rival, the map is built anew with home as the anchor: the landmarks'
+//!    directions from there stand in the snapshot, and the robot's pose in the home frame is all that control needs. The
+//!    [`smoother`] does it from everything stored so far, and does it again a few times, ever more seldom, so that no
+//!    linearisation from the time when ranges were unknown survives.
+//!
+//! A filter that no longer explains what it sees (a kick, a kidnap, a wrong hypothesis) restarts at stage 1 where it stands.
+
+pub mod map;
+pub mod motion;
+pub mod smoother;
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
+use super::resection::{self, position_sd_m, resect};
+use crate::geometry::{Pose, Vector2, angle_of, direction, wrap};
+use crate::observation::{Bearing, Estimate, HomeSnapshot, LandmarkId, Odometry};
+use map::{Map, Prior, Update};
+use motion::Motion;
+use smoother::{Frame, Iterate, Sighting, Solution, Stretch};
+
+/// Knobs of the filter.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct FilterSettings {
+    /// Mean of the prior on inverse range, 1/m.
+    pub inverse_range_mean: f64,
+    /// Standard deviation of that prior, 1/m.
+    pub inverse_range_sd: f64,
+    /// Noise of measured speed as a share of it, in each step anew.
+    pub speed_noise_share: f64,
+    /// Noise of measured speed at any speed while moving, m/s.
+    pub speed_noise_m_s: f64,
+    /// Noise of measured yaw rate as a share of it.
+    pub turn_noise_share: f64,
+    /// Noise of yaw rate per speed (wheels that differ), rad/m.
+    pub turn_noise_rad_m: f64,
+    /// Sideways motion of the axle as a share of speed (scrub).
+    pub sideways_noise_share: f64,
+    /// A bearing whose normalised innovation squared exceeds this is refused (chi-square, one degree of freedom; 10.8 is 0.1 %).
+    pub gate: f64,
+    /// Landmarks in the state at most.
+    pub max_landmarks: usize,
+    /// Home is adopted once its position is known to this share of its distance...
+    pub adopt_sd_share: f64,
+    /// ... or to this, m.
+    pub adopt_sd_m: f64,
+    /// Rivals of the adopted hypothesis must be worse by this much (log likelihood).
+    pub adopt_margin: f64,
+    /// Steps in a row with more bearings refused than used, after which the filter gives its belief up.
+    pub patience_steps: u32,
+    /// Steps that the smoother looks back on at most; later on the filter runs alone.
+    pub history_steps: usize,
+}
+
+impl Default for FilterSettings {
+    fn default() -> Self {
+        Self {
+            inverse_range_mean: 0.4,
+            inverse_range_sd: 0.4,
+            speed_noise_share: 0.04,
+            speed_noise_m_s: 0.003,
+            turn_noise_share: 0.04,
+            turn_noise_rad_m: 0.03,
+            sideways_noise_share: 0.01,
+            gate: 10.8,
+            max_landmarks: 60,
+            adopt_sd_share: 0.06,
+            adopt_sd_m: 0.04,
+            adopt_margin: 5.0,
+            patience_steps: 8,
+            history_steps: 200,
+        }
+    }
+}
+
+impl FilterSettings {
+    /// Prior of a landmark whose direction from the anchor is measured and whose inverse range is supposed.
+    fn prior(&self, from_anchor: &Bearing, inverse_range: f64) -> Prior {
+        Prior {
+            mean: [from_anchor.azimuth_rad, inverse_range],
+            variance: [from_anchor.sd_rad * from_anchor.sd_rad, self.inverse_range_sd * self.inverse_range_sd],
+        }
+    }
+}
+
+/// What a step did with its bearings.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct StepReport {
+    /// Bearings that updated the belief.
+    pub matched: usize,
+    /// Bearings refused.
+    pub rejected: usize,
+    /// Normalised innovation squared of the used bearings, all together.
+    pub nis: f64,
+}
+
+/// Farthest from the first anchor at which landmarks are still added to it, m: farther off a first bearing says little about
+/// the direction from the anchor.
+const FIRST_ANCHOR_REACH_M: f64 = 0.5;
+/// Standard deviation of the supposed direction of a landmark added to the first anchor, rad.
+const FIRST_ANCHOR_DIRECTION_SD: f64 = 0.7;
+/// Share of a landmark's stored bearings that may miss the gate before the smoother drops the landmark.
+const MISFIT_SHARE: f64 = 0.3;
+/// Times that the smoother is run at most, each time without what did not fit the time before.
+const SMOOTHER_ROUNDS: usize = 4;
+/// Greatest mean squared normalised residual of a solution that is believed.
+const GREATEST_MEAN_SQUARE: f64 = 2.5;
+
+/// One stored step: motion since the step before, bearings that were used, pose in the anchor frame.
+#[derive(Debug, Clone)]
+struct Stored {
+    motion: Motion,
+    bearings: Vec<Bearing>,
+    pose: Pose,
+}
+
+#[derive(Debug, Clone, Copy)]
+enum Stage {
+    /// `guess`: home in the first anchor's frame, by the best hypothesis.
+    Search { guess: Option<Pose> },
+    /// Steps stored when the smoother runs next, and the number of steps between.
+    Homing { next_rebuild: usize, interval: usize },
+}
+
+/// The filter.
+#[derive(Debug, Clone)]
+pub struct AnchoredFilter {
+    settings: FilterSettings,
+    home: BTreeMap<LandmarkId, Bearing>,
+    stage: Stage,
+    map: Map,
+    history: Vec<Stored>,
+    bad_steps: u32,
+    restarts: u32,
+}
+
+impl AnchoredFilter {
+    /// A filter that knows the snapshot and nothing else.
+    #[must_use]
+    pub fn new(settings: FilterSettings, home: &HomeSnapshot) -> Self {
+        Self {
+            settings,
+            home: home.bearings.iter().map(|b| (b.id, *b)).collect(),
+            stage: Stage::Search { guess: None },
+            map: Map::at_anchor(),
+            history: Vec::new(),
+            bad_steps: 0,
+            restarts: 0,
+        }
+    }
+
+    /// Forgets all but the snapshot: the search begins anew here.
+    pub fn restart(&mut self) {
+        self.stage = Stage::Search { guess: None };
+        self.map = Map::at_anchor();
+        self.history.clear();
+        self.bad_steps = 0;
+        self.restarts += 1;
+    }
+
+    /// How often the filter gave its belief up.
+    #[must_use]
+    pub fn restarts(&self) -> u32 {
+        self.restarts
+    }
+
+    /// The robot's pose in the home frame with its covariance, once home is found.
+    #[must_use]
+    pub fn estimate(&self) -> Option<Estimate> {
+        matches!(self.stage, Stage::Homing { .. }).then(|| self.map.estimate())
+    }
+
+    /// The robot's pose in the home frame by the best hypothesis; no covariance is claimed.
+    #[must_use]
+    pub fn best_pose(&self) -> Option<Pose> {
+        match self.stage {
+            Stage::Search { guess } => guess.map(|home| home.to_local(&self.map.pose())),
+            Stage::Homing { .. } => Some(self.map.pose()),
+        }
+    }
+
+    /// Time update and measurement update.
+    pub fn step(&mut self, odometry: &Odometry, bearings: &[Bearing]) -> StepReport {
+        let motion = Motion::from_odometry(odometry, &self.settings);
+        if odometry.dt_s > 0.0 {
+            self.map.predict(&motion);
+        }
+        match self.stage {
+            Stage::Search { .. } => self.search(motion, bearings),
+            Stage::Homing { .. } => self.track(motion, bearings),
+        }
+    }
+
+    fn search(&mut self, motion: Motion, bearings: &[Bearing]) -> StepReport {
+        let mut report = self.search_update(motion, bearings);
+        if self.map.seen_now() < 3 && bearings.len() >= 6 {
+            // The landmarks that the anchor held on to are gone; begin again with those in view.
+            self.restart();
+            report = self.search_update(motion, bearings);
+        }
+        self.seek_home();
+        report
+    }
+
+    fn search_update(&mut self, motion: Motion, bearings: &[Bearing]) -> StepReport {
+        let mut update = self.map.update(bearings, &self.settings, 3);
+        let pose = self.map.pose();
+        if pose.position().norm() <= FIRST_ANCHOR_REACH_M {
+            let room = self.map.make_room(update.strangers.len(), self.settings.max_landmarks);
+            for bearing in spread_over_azimuth(&update.strangers, room) {
+                if !self.home.contains_key(&bearing.id) {
+                    continue;
+                }
+                let supposed = Bearing {
+                    azimuth_rad: wrap(pose.heading + bearing.azimuth_rad),
+                    sd_rad: FIRST_ANCHOR_DIRECTION_SD,
+                    ..bearing
+                };
+                let prior = self.settings.prior(&supposed, self.settings.inverse_range_mean);
+                self.add(&prior, &bearing, &mut update);
+            }
+        }
+        self.store(motion, &update);
+        StepReport { matched: update.used.len(), rejected: update.rejected, nis: update.nis }
+    }
+
+    fn add(&mut self, prior: &Prior, bearing: &Bearing, update: &mut Update) {
+        if self.map.add(prior, bearing, &self.settings) {
+            update.used.push(*bearing);
+        } else {
+            update.rejected += 1;
+        }
+    }
+
+    fn store(&mut self, motion: Motion, update: &Update) {
+        if self.history.len() < self.settings.history_steps {
+            self.history.push(Stored { motion, bearings: update.used.clone(), pose: self.map.pose() });
+        }
+    }
+
+    fn track(&mut self, motion: Motion, bearings: &[Bearing]) -> StepReport {
+        let mut update = self.map.update(bearings, &self.settings, 2);
+        let nis = update.nis;
+        let updated = update.used.len();
+        let room = self.map.make_room(update.strangers.len(), self.settings.max_landmarks);
+        for bearing in spread_over_azimuth(&update.strangers, room) {
+            let Some(home) = self.home.get(&bearing.id) else { continue };
+            match self.map.triangulated_prior(home, &bearing, &self.settings) {
+                Some(prior) => self.add(&prior, &bearing, &mut update),
+                None => {
+                    update.rejected += 1;
+                    self.map.ban(bearing.id, 3);
+                }
+            }
+        }
+        self.store(motion, &update);
+        let report = StepReport { matched: updated, rejected: update.rejected, nis };
+        // Landmarks just added fit by construction; only those that were predicted testify for the belief.
+        let against = update.rejected + update.banned;
+        let bad = against >= 4 && against > updated;
+        self.bad_steps = if bad { self.bad_steps + 1 } else { 0 };
+        if self.bad_steps > self.settings.patience_steps {
+            self.restart();
+            return self.search(motion, bearings);
+        }
+        if let Stage::Homing { next_rebuild, interval } = self.stage
+            && self.history.len() >= next_rebuild
+            && next_rebuild <= self.settings.history_steps
+        {
+            self.rebuild();
+            let interval = interval + interval.div_ceil(2);
+            self.stage = Stage::Homing { next_rebuild: self.history.len() + interval, interval };
+        }
+        report
+    }
+
+    /// Looks for home; moves on to the second stage once the answer is sharp and without rival.
+    fn seek_home(&mut self) {
+        let members: Vec<(LandmarkId, resection::Sighting)> = self
+            .map
+            .ids()
+            .enumerate()
+            .filter_map(|(k, id)| {
+                let home = self.home.get(&id)?;
+                let (mean, covariance) = self.map.landmark(k);
+                let sighting = resection::Sighting {
+                    direction_rad: mean[0],
+                    inverse_range: mean[1],
+                    covariance,
+                    home_bearing_rad: home.azimuth_rad,
+                    variance: home.sd_rad * home.sd_rad,
+                };
+                Some((id, sighting))
+            })
+            .collect();
+        let sightings: Vec<_> = members.iter().map(|m| m.1).collect();
+        let Stage::Search { guess } = self.stage else { return };
+        let robot = self.map.pose().position();
+        let found = resect(&sightings, robot, guess);
+        let Some(best) = found.first().copied() else { return };
+        self.stage = Stage::Search { guess: Some(best.home) };
+        let unrivalled = found.get(1).is_none_or(|second| second.cost - best.cost > self.settings.adopt_margin);
+        let inliers: Vec<_> =
+            members.iter().filter(|m| m.1.normalised_squared(&best.home) <= self.settings.gate).copied().collect();
+        if !unrivalled || inliers.len() < 3 || 3 * inliers.len() < 2 * members.len() {
+            return;
+        }
+        let sharp_sd = self.sharp_sd((best.home.position() - robot).norm());
+        let inlier_sightings: Vec<_> = inliers.iter().map(|m| m.1).collect();
+        if position_sd_m(&inlier_sightings, &best.home) > sharp_sd {
+            return;
+        }
+        let ids: Vec<_> = inliers.iter().map(|m| m.0).collect();
+        let start = Iterate {
+            poses: self.history.iter().map(|s| best.home.to_local(&s.pose)).collect(),
+            landmarks: inliers.iter().map(|m| from_home(&m.1, &best.home)).collect(),
+        };
+        let supposed = best.home.to_local(&self.map.pose()).position();
+        let Some((ids, solution)) = self.smooth(ids, start) else { return };
+        let sharp = |e: &Estimate| e.position_sd_m() <= self.sharp_sd(e.range_m());
+        let candidate = Map::from_solution(&ids, solution.mean.clone(), solution.covariance.clone());
+        let estimate = candidate.estimate();
+        if ids.len() < 3 || !sharp(&estimate) || (estimate.pose.position() - supposed).norm() > 4.0 * sharp_sd {
+            return;
+        }
+        self.map = candidate;
+        self.keep_poses(&solution);
+        self.bad_steps = 0;
+        self.stage = Stage::Homing { next_rebuild: self.history.len() + 1, interval: 1 };
+    }
+
+    /// How well the robot's place must be known at this distance from home, m.
+    fn sharp_sd(&self, range_m: f64) -> f64 {
+        (self.settings.adopt_sd_share * range_m).max(self.settings.adopt_sd_m)
+    }
+
+    fn keep_poses(&mut self, solution: &Solution) {
+        for (stored, pose) in self.history.iter_mut().zip(&solution.at.poses) {
+            stored.pose = *pose;
+        }
+    }
+
+    /// Builds the map of the second stage anew from all that is stored.
+    fn rebuild(&mut self) {
+        let ids: Vec<_> = self.map.ids().collect();
+        let held = ids.len();
+        let start = Iterate {
+            poses: self.history.iter().map(|s| s.pose).collect(),
+            landmarks: (0..ids.len()).map(|k| self.map.landmark(k).0).collect(),
+        };
+        if let Some((kept, solution)) = self.smooth(ids, start)
+            && kept.len() >= 3
+            && 2 * kept.len() > held
+        {
+            self.map.replace(&kept, solution.mean.clone(), solution.covariance.clone());
+            self.keep_poses(&solution);
+        }
+    }
+
+    /// Smooths the history with the given landmarks, drops bearings and landmarks that do not fit, and smooths again. `None`
+    /// where no believable solution comes out.
+    fn smooth(&self, mut ids: Vec<LandmarkId>, mut start: Iterate) -> Option<(Vec<LandmarkId>, Solution)> {
+        let gate = self.settings.gate;
+        let mut refused: Vec<(usize, LandmarkId)> = Vec::new();
+        for round in 1..=SMOOTHER_ROUNDS {
+            let index: BTreeMap<LandmarkId, usize> = ids.iter().enumerate().map(|(k, id)| (*id, k)).collect();
+            // The ranges of one room are alike: together their priors may say no more about the scale than one of them does.
+            // Scale is for odometry to tell.
+            let priors: Vec<Prior> = ids
+                .iter()
+                .map(|id| {
+                    let mut prior = self.settings.prior(&self.home[id], self.settings.inverse_range_mean);
+                    prior.variance[1] *= ids.len() as f64;
+                    prior
+                })
+                .collect();
+            let frames: Vec<Frame> = self
+                .history
+                .iter()
+                .enumerate()
+                .map(|(f, stored)| Frame {
+                    motion: stored.motion,
+                    sightings: stored
+                        .bearings
+                        .iter()
+                        .filter(|b| !refused.contains(&(f, b.id)))
+                        .filter_map(|b| {
+                            let landmark = *index.get(&b.id)?;
+                            Some(Sighting { landmark, azimuth_rad: b.azimuth_rad, variance: b.sd_rad * b.sd_rad })
+                        })
+                        .collect(),
+                })
+                .collect();
+            // Wrong matches are told apart first, then what is left is taken at its word.
+            let heavy_tails = round == 1;
+            let solution = Stretch { frames: &frames, priors: &priors, heavy_tails }.solve(start)?;
+            let mut seen = vec![(0_usize, 0_usize); ids.len()];
+            let mut clean = true;
+            for (f, frame) in frames.iter().enumerate() {
+                for s in &frame.sightings {
+                    seen[s.landmark].0 += 1;
+                    if Stretch::residual_squared(&solution.at, f, s) > gate {
+                        seen[s.landmark].1 += 1;
+                        refused.push((f, ids[s.landmark]));
+                        clean = false;
+                    }
+                }
+            }
+            let keeps = |k: usize| {
+                let (total, misses) = seen[k];
+                let off = wrap(solution.at.landmarks[k][0] - priors[k].mean[0]);
+                misses as f64 <= MISFIT_SHARE * total as f64 && off * off <= gate * priors[k].variance[0]
+            };
+            let kept: Vec<usize> = (0..ids.len()).filter(|&k| keeps(k)).collect();
+            if !heavy_tails && (clean || round == SMOOTHER_ROUNDS) && kept.len() == ids.len() {
+                let (sum, count) = solution.chi_square;
+                return (sum <= GREATEST_MEAN_SQUARE * count as f64).then_some((ids, solution));
+            }
+            start = Iterate {
+                poses: solution.at.poses.clone(),
+                landmarks: kept.iter().map(|&k| solution.at.landmarks[k]).collect(),
+            };
+            ids = kept.iter().map(|&k| ids[k]).collect();
+            if ids.len() < 3 {
+                return None;
+            }
+        }
+        None
+    }
+}
+
+/// (direction, inverse range) from home of a landmark known from the first anchor.
+fn from_home(sighting: &resection::Sighting, home: &Pose) -> [f64; 2] {
+    let g: Vector2<f64> = direction(sighting.direction_rad) - home.position() * sighting.inverse_range;
+    let inverse_range = (sighting.inverse_range / g.norm().max(1e-6)).clamp(0.02, 5.0);
+    [wrap(angle_of(g) - home.heading), inverse_range]
+}
+
+/// At most `count` of the bearings, chosen so that they cover the azimuths evenly; of one sector the surest first.
+fn spread_over_azimuth(bearings: &[Bearing], count: usize) -> Vec<Bearing> {
+    const SECTORS: usize = 24;
+    if bearings.len() <= count {
+        return bearings.to_vec();
+    }
+    let mut sectors: Vec<Vec<Bearing>> = vec![Vec::new(); SECTORS];
+    for b in bearings {
+        let turn = b.azimuth_rad / std::f64::consts::TAU + 0.5;
+        sectors[((turn * SECTORS as f64) as usize).min(SECTORS - 1)].push(*b);
+    }
+    for sector in &mut sectors {
+        sector.sort_by(|a, b| a.sd_rad.total_cmp(&b.sd_rad).then(a.id.cmp(&b.id)));
+    }
+    let deepest = sectors.iter().map(Vec::len).max().unwrap_or(0);
+    (0..deepest).flat_map(|depth| sectors.iter().filter_map(move |s| s.get(depth).copied())).take(count).collect()
+}

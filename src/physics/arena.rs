@@ -1,0 +1,271 @@
+//! The room in rapier: walls, bodies and the robot's round body, and what happens where they touch.
+//!
+//! The only file that knows rapier and its vector types. Rapier's world is a top view, so it has no gravity; friction with
+//! the floor is not its business (see `chassis`). Everything crosses this border in f64.
+
+use rapier2d::prelude::{
+    ColliderBuilder, ColliderHandle, MassProperties, PhysicsWorld, Pose as RapierPose, RigidBodyBuilder, RigidBodyHandle,
+    Rotation, Vector,
+};
+
+use super::Struck;
+use super::chassis::PlanarVelocity;
+use super::movers::is_solid;
+use super::polygon::{contains, edges, segments_cross};
+use super::slide::SlidingBody;
+use crate::geometry::{Pose, Vector2, atan2, sin_cos};
+use crate::world::{Footprint, MotionSpec, World};
+
+/// Coulomb friction of the robot's hull on walls and bodies.
+const HULL_FRICTION: f32 = 0.3;
+/// Share of the speed of approach that a hit gives back.
+const HULL_RESTITUTION: f32 = 0.1;
+/// Size of what moves, m. Rapier's tolerances scale with it: contacts may sink in by 0.5 mm and are foreseen at 2 mm.
+const LENGTH_UNIT_M: f32 = 0.1;
+/// Depth of a wall behind its face, m, where the room leaves space for it.
+const WALL_DEPTH_M: f64 = 0.5;
+
+/// What contact made of a substep.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Touch {
+    /// Displacement of the robot's axle, m.
+    pub(super) displacement: Vector2<f64>,
+    /// Change of its heading, rad.
+    pub(super) turn: f64,
+    /// Its velocity at the end.
+    pub(super) velocity: PlanarVelocity,
+}
+
+/// Outcome of a substep.
+#[derive(Debug, Clone)]
+pub(super) struct ArenaStep {
+    /// Rapier's motion, where the robot was within 2 mm of something; nothing where it was free.
+    pub(super) touch: Option<Touch>,
+    /// Contacts that began: with what, and their impulse so far, N s.
+    pub(super) began: Vec<(Struck, f64)>,
+}
+
+/// A body that can be pushed.
+struct Loose {
+    /// Its index in the world.
+    index: usize,
+    handle: RigidBodyHandle,
+    slide: SlidingBody,
+}
+
+/// Rapier's copy of the room.
+pub(super) struct Arena {
+    physics: PhysicsWorld,
+    robot: RigidBodyHandle,
+    hull: ColliderHandle,
+    /// Bodies that move by themselves and that the robot can run into, with their index in the world.
+    movers: Vec<(usize, RigidBodyHandle)>,
+    /// Bodies that can be pushed.
+    loose: Vec<Loose>,
+    /// What the robot touches now.
+    touching: Vec<ColliderHandle>,
+}
+
+impl Arena {
+    pub(super) fn new(world: &World, start: Pose, yaw_inertia: f64) -> Self {
+        let mut physics = PhysicsWorld { gravity: Vector::ZERO, ..PhysicsWorld::default() };
+        physics.integration_parameters.length_unit = LENGTH_UNIT_M;
+        // Contacts are computed anew each substep, so that none is decided on a pose of some substeps ago.
+        physics.integration_parameters.contact_recycling = false;
+        // At a millisecond a step, rapier's four inner steps per step add cost and no accuracy.
+        physics.integration_parameters.num_solver_iterations = 1;
+
+        let hard = |shape: ColliderBuilder| shape.friction(HULL_FRICTION).restitution(HULL_RESTITUTION).density(0.0);
+        for (k, [a, b, apex]) in walls(&world.outline).enumerate() {
+            let wall = hard(ColliderBuilder::triangle(vector(a), vector(b), vector(apex)));
+            physics.insert_collider(wall.user_data(mark(Struck::Wall(k))), None);
+        }
+        let robot_spec = &world.spec.robot;
+        let mut movers = Vec::new();
+        let mut loose = Vec::new();
+        for (index, body) in world.bodies.iter().enumerate().filter(|(_, b)| is_solid(b, robot_spec.height_m)) {
+            let shape = hard(shape(&body.footprint)).user_data(mark(Struck::Body(index)));
+            if let Some(MotionSpec::Pushed { mass_kg, friction }) = body.motion {
+                let dynamic = RigidBodyBuilder::dynamic().pose(rapier_pose(&body.pose)).can_sleep(false);
+                let handle = physics.insert(dynamic, shape.mass(mass_kg as f32)).0;
+                loose.push(Loose { index, handle, slide: SlidingBody::new(&body.footprint, friction) });
+            } else if body.motion.is_some() {
+                let kinematic = RigidBodyBuilder::kinematic_position_based().pose(rapier_pose(&body.pose)).can_sleep(false);
+                movers.push((index, physics.insert(kinematic, shape).0));
+            } else {
+                physics.insert_collider(shape.position(rapier_pose(&body.pose)), None);
+            }
+        }
+        let centre_of_gravity = Vector::new(robot_spec.centre_of_gravity_m as f32, 0.0);
+        let mass = MassProperties::new(centre_of_gravity, robot_spec.mass_kg as f32, yaw_inertia as f32);
+        let body =
+            RigidBodyBuilder::dynamic().pose(rapier_pose(&start)).additional_mass_properties(mass).can_sleep(false).build();
+        let (robot, hull) = physics.insert(body, hard(ColliderBuilder::ball(robot_spec.radius_m as f32)));
+        Self { physics, robot, hull, movers, loose, touching: Vec::new() }
+    }
+
+    /// Where each moving body will be at the end of the next substep.
+    pub(super) fn lead_bodies(&mut self, poses: &[Pose]) {
+        for &(index, handle) in &self.movers {
+            if let Some(body) = self.physics.bodies.get_mut(handle) {
+                body.set_next_kinematic_position(rapier_pose(&poses[index]));
+            }
+        }
+    }
+
+    /// Steps `dt` seconds with the robot's axle at `pose` and its centre of gravity at `velocity`.
+    pub(super) fn step(&mut self, pose: &Pose, velocity: &PlanarVelocity, dt: f64) -> ArenaStep {
+        let before = rapier_pose(pose);
+        if let Some(robot) = self.physics.bodies.get_mut(self.robot) {
+            robot.set_position(before, false);
+            robot.set_linvel(vector(velocity.linear), false);
+            robot.set_angvel(velocity.yaw_rate as f32, false);
+        }
+        for loose in &self.loose {
+            if let Some(body) = self.physics.bodies.get_mut(loose.handle) {
+                let velocity = PlanarVelocity { linear: from_vector(body.linvel()), yaw_rate: f64::from(body.angvel()) };
+                let slowed = loose.slide.slowed(&velocity, dt);
+                body.set_linvel(vector(slowed.linear), false);
+                body.set_angvel(slowed.yaw_rate as f32, false);
+            }
+        }
+        self.physics.integration_parameters.dt = dt as f32;
+        self.physics.step();
+
+        let (near, began) = self.watch_contacts();
+        let touch = near.then(|| self.physics.bodies.get(self.robot)).flatten().map(|robot| {
+            let after = robot.position();
+            let turn = before.rotation.inverse() * after.rotation;
+            Touch {
+                displacement: from_vector(after.translation - before.translation),
+                turn: atan2(f64::from(turn.im), f64::from(turn.re)),
+                velocity: PlanarVelocity { linear: from_vector(robot.linvel()), yaw_rate: f64::from(robot.angvel()) },
+            }
+        });
+        ArenaStep { touch, began }
+    }
+
+    /// Where the bodies that can be pushed are now, by their index in the world.
+    pub(super) fn loose_poses(&self) -> impl Iterator<Item = (usize, Pose)> + '_ {
+        self.loose.iter().filter_map(|loose| {
+            let pose = self.physics.bodies.get(loose.handle)?.position();
+            let heading = atan2(f64::from(pose.rotation.im), f64::from(pose.rotation.re));
+            let position = from_vector(pose.translation);
+            Some((loose.index, Pose::new(position.x, position.y, heading)))
+        })
+    }
+
+    /// Whether the robot is close to anything, and which contacts began. A contact begins when it first carries an
+    /// impulse and ends when the gap has grown beyond what rapier foresees, so that a robot that rattles along a wall counts
+    /// once.
+    fn watch_contacts(&mut self) -> (bool, Vec<(Struck, f64)>) {
+        let mut near = Vec::new();
+        let mut began = Vec::new();
+        for pair in self.physics.narrow_phase.contact_pairs_with(self.hull) {
+            if !pair.has_any_active_contact() {
+                continue;
+            }
+            let other = if pair.collider1 == self.hull { pair.collider2 } else { pair.collider1 };
+            let known = self.touching.contains(&other);
+            let impulse = pair.total_impulse_magnitude();
+            let touches = known || impulse > 0.0;
+            near.push((other, touches));
+            if touches && !known {
+                let mark = self.physics.colliders.get(other).map_or(0, |collider| collider.user_data);
+                began.push((struck(mark), f64::from(impulse)));
+            }
+        }
+        self.touching.clear();
+        self.touching.extend(near.iter().filter(|(_, touches)| *touches).map(|(other, _)| *other));
+        (!near.is_empty(), began)
+    }
+}
+
+/// What a collider stands for, as the number that rapier carries for us: walls are even, bodies odd.
+fn mark(struck: Struck) -> u128 {
+    match struck {
+        Struck::Wall(k) => 2 * k as u128,
+        Struck::Body(k) => 2 * k as u128 + 1,
+    }
+}
+
+/// The inverse of [`mark`].
+fn struck(mark: u128) -> Struck {
+    let k = (mark / 2) as usize;
+    if mark.is_multiple_of(2) { Struck::Wall(k) } else { Struck::Body(k) }
+}
+
+/// Solid walls: a triangle behind each edge of the room, its apex outside. Triangles have no overhang, so with an apex close
+/// enough they fit behind any edge, beside sharp reflex corners and in thin partitions too.
+fn walls(outline: &[Vector2<f64>]) -> impl Iterator<Item = [Vector2<f64>; 3]> + '_ {
+    edges(outline).map(|(a, b)| {
+        let along = b - a;
+        let outwards = Vector2::new(along.y, -along.x) / along.norm();
+        let middle = (a + b) * 0.5;
+        let mut depth = WALL_DEPTH_M;
+        // Halving ends at a tenth of a micrometre at the latest, which is as good as a plane.
+        while depth > 1e-7 && !fits([a, b, middle + outwards * depth], outline) {
+            depth *= 0.5;
+        }
+        [a, b, middle + outwards * depth]
+    })
+}
+
+/// Whether the triangle stays out of the room.
+fn fits(triangle: [Vector2<f64>; 3], outline: &[Vector2<f64>]) -> bool {
+    let [a, b, apex] = triangle;
+    let holds_corner = outline.iter().any(|&c| c != a && c != b && contains(&triangle, c));
+    let crosses = edges(outline).any(|(c, d)| segments_cross(a, apex, c, d) || segments_cross(b, apex, c, d));
+    !holds_corner && !crosses && !contains(outline, apex)
+}
+
+fn shape(footprint: &Footprint) -> ColliderBuilder {
+    match footprint {
+        Footprint::Disc(radius) => ColliderBuilder::ball(*radius as f32),
+        Footprint::Polygon(corners) => {
+            let corners: Vec<_> = corners.iter().copied().map(vector).collect();
+            // A polygon too thin for f32 has no hull; its outline serves.
+            ColliderBuilder::convex_hull(&corners).unwrap_or_else(|| ColliderBuilder::polyline(corners, None))
+        }
+    }
+}
+
+fn vector(v: Vector2<f64>) -> Vector {
+    Vector::new(v.x as f32, v.y as f32)
+}
+
+fn from_vector(v: Vector) -> Vector2<f64> {
+    Vector2::new(f64::from(v.x), f64::from(v.y))
+}
+
+fn rapier_pose(pose: &Pose) -> RapierPose {
+    let (sin, cos) = sin_cos(pose.heading);
+    RapierPose::from_parts(vector(pose.position()), Rotation::from_cos_sin_unchecked(cos as f32, sin as f32))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::cross;
+
+    /// A room with a thin partition and a sharp reflex corner: no wall may reach into it.
+    #[test]
+    fn walls_stay_out_of_a_room_that_is_not_convex() {
+        let corners =
+            [[0.0, 0.0], [4.0, 0.0], [4.0, 3.0], [2.1, 3.0], [2.05, 0.5], [2.0, 3.0], [1.0, 3.0], [0.9, 2.0], [0.0, 2.1]];
+        let outline: Vec<_> = corners.iter().map(|c| Vector2::new(c[0], c[1])).collect();
+        let mut deepest: f64 = 0.0;
+        for [a, b, apex] in walls(&outline) {
+            assert!(cross(b - a, apex - a) < 0.0);
+            deepest = deepest.max(-cross(b - a, apex - a) / (b - a).norm());
+            for k in 1..20 {
+                for l in 1..20 {
+                    let (s, t) = (f64::from(k) / 20.0, f64::from(l) / 20.0);
+                    let point = (a * (1.0 - s) + b * s) * (1.0 - t) + apex * t;
+                    assert!(!contains(&outline, point), "{a} {b} {apex} {point}");
+                }
+            }
+        }
+        assert!((deepest - WALL_DEPTH_M).abs() < 1e-9);
+    }
+}

@@ -1,0 +1,153 @@
+//! Writing results without leaving half a file or taking someone else's.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use crate::error::{Error, Result};
+
+/// File that marks a folder as ours; it holds the name of the verb that writes it.
+const MARKER: &str = ".wayhome";
+/// Ending of files that are still being written.
+const PARTIAL: &str = ".wayhome-partial";
+
+/// A folder of results that one verb of the program writes.
+///
+/// A folder that the same verb wrote before may be written again; one that holds anything else is refused. Every file appears
+/// whole or not at all: it is written under another name and then renamed.
+#[derive(Debug)]
+pub struct OutputFolder {
+    path: PathBuf,
+    names: &'static [&'static str],
+    written: BTreeSet<&'static str>,
+}
+
+impl OutputFolder {
+    /// Opens or creates the folder for `verb`, which writes files of the given names.
+    ///
+    /// # Errors
+    /// When the folder cannot be created or read, or holds what `verb` has not written.
+    pub fn open(path: &Path, verb: &str, names: &'static [&'static str]) -> Result<Self> {
+        fs::create_dir_all(path).map_err(io_error("create folder", path))?;
+        let mut held = Vec::new();
+        for entry in fs::read_dir(path).map_err(io_error("read folder", path))? {
+            held.push(entry.map_err(io_error("read folder", path))?.file_name().to_string_lossy().into_owned());
+        }
+        held.sort();
+        let marker = path.join(MARKER);
+        let refused = |found: String| Error::OutputTaken { path: path.to_owned(), found };
+        if !held.is_empty() {
+            match fs::read_to_string(&marker) {
+                Ok(owner) if owner.trim_end() == verb => {}
+                Ok(owner) => return Err(refused(format!("the results of `wayhome {}`", owner.trim_end()))),
+                Err(e) if e.kind() == io::ErrorKind::NotFound => return Err(refused(format!("`{}`", held[0]))),
+                Err(source) => return Err(Error::Io { action: "read", path: marker, source }),
+            }
+        }
+        if let Some(foreign) = held.iter().find(|h| *h != MARKER && !h.ends_with(PARTIAL) && !names.contains(&h.as_str())) {
+            return Err(refused(format!("`{foreign}`")));
+        }
+        for partial in held.iter().filter(|h| h.ends_with(PARTIAL)) {
+            remove(&path.join(partial))?;
+        }
+        write_atomically(&marker, format!("{verb}\n").as_bytes())?;
+        Ok(Self { path: path.to_owned(), names, written: BTreeSet::new() })
+    }
+
+    /// Where it is.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Writes one of the folder's files.
+    ///
+    /// # Errors
+    /// When the file cannot be written.
+    ///
+    /// # Panics
+    /// When `name` is none of the names that the folder was opened with, which is a fault in this program.
+    pub fn write(&mut self, name: &'static str, bytes: &[u8]) -> Result<()> {
+        assert!(self.names.contains(&name), "`{name}` is not announced");
+        write_atomically(&self.path.join(name), bytes)?;
+        self.written.insert(name);
+        Ok(())
+    }
+
+    /// Removes what an earlier run has left and this one has not written.
+    ///
+    /// # Errors
+    /// When a file cannot be removed.
+    pub fn finish(self) -> Result<()> {
+        self.names.iter().filter(|n| !self.written.contains(*n)).try_for_each(|name| remove(&self.path.join(name)))
+    }
+}
+
+/// Writes a file under another name and renames it, so that it is never seen half written.
+///
+/// # Errors
+/// When the file cannot be written.
+pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<()> {
+    let mut name = path.file_name().unwrap_or_default().to_owned();
+    name.push(PARTIAL);
+    let partial = path.with_file_name(name);
+    fs::write(&partial, bytes).and_then(|()| fs::rename(&partial, path)).map_err(|source| {
+        // Best effort: the write itself is what failed and what the caller hears about.
+        let _ = fs::remove_file(&partial);
+        Error::Io { action: "write", path: path.to_owned(), source }
+    })
+}
+
+fn remove(path: &Path) -> Result<()> {
+    match fs::remove_file(path) {
+        Err(source) if source.kind() != io::ErrorKind::NotFound => {
+            Err(Error::Io { action: "remove", path: path.to_owned(), source })
+        }
+        _ => Ok(()),
+    }
+}
+
+fn io_error(action: &'static str, path: &Path) -> impl Fn(io::Error) -> Error {
+    move |source| Error::Io { action, path: path.to_owned(), source }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const NAMES: &[&str] = &["a.txt", "b.txt"];
+
+    #[test]
+    fn a_verb_may_write_its_folder_again() {
+        let base = tempfile::tempdir().unwrap();
+        let path = base.path().join("new/folder");
+        let mut first = OutputFolder::open(&path, "home", NAMES).unwrap();
+        first.write("a.txt", b"1").unwrap();
+        first.write("b.txt", b"1").unwrap();
+        first.finish().unwrap();
+        fs::write(path.join("a.txt.wayhome-partial"), "cut off").unwrap();
+        let mut second = OutputFolder::open(&path, "home", NAMES).unwrap();
+        second.write("a.txt", b"2").unwrap();
+        second.finish().unwrap();
+        assert_eq!(fs::read(path.join("a.txt")).unwrap(), b"2");
+        let mut held: Vec<_> = fs::read_dir(&path).unwrap().map(|e| e.unwrap().file_name()).collect();
+        held.sort();
+        assert_eq!(held, [".wayhome", "a.txt"], "what is stale is gone");
+    }
+
+    #[test]
+    fn what_others_wrote_stays() {
+        let base = tempfile::tempdir().unwrap();
+        fs::write(base.path().join("a.txt"), "mine").unwrap();
+        let error = OutputFolder::open(base.path(), "home", NAMES).unwrap_err().to_string();
+        assert!(error.contains("`a.txt`"), "{error}");
+        assert_eq!(fs::read(base.path().join("a.txt")).unwrap(), b"mine");
+
+        let ours = base.path().join("ours");
+        OutputFolder::open(&ours, "home", NAMES).unwrap().finish().unwrap();
+        assert!(OutputFolder::open(&ours, "render", NAMES).unwrap_err().to_string().contains("wayhome home"));
+        fs::write(ours.join("notes.md"), "mine").unwrap();
+        assert!(OutputFolder::open(&ours, "home", NAMES).unwrap_err().to_string().contains("notes.md"));
+    }
+}

@@ -1,0 +1,80 @@
+//! Panoramas as PNG files.
+
+use std::io::Cursor;
+use std::path::Path;
+
+use image::{DynamicImage, ImageBuffer, ImageFormat, Luma, Rgb};
+
+use crate::error::{Error, Result};
+use crate::panorama::Panorama;
+
+/// The colours, 8 bits a channel.
+///
+/// # Errors
+/// When the panorama cannot be encoded; `name` is what the error calls it.
+pub fn colours_png(panorama: &Panorama, name: &str) -> Result<Vec<u8>> {
+    let rgb = panorama.rgba.chunks_exact(4).flat_map(|p| [p[0], p[1], p[2]]).collect();
+    encode(buffer::<Rgb<u8>>(panorama, rgb).map(DynamicImage::ImageRgb8), name)
+}
+
+/// The range in millimetres, rounded, 16 bits; 65535 stands for all that is farther.
+///
+/// # Errors
+/// When the panorama has no range or cannot be encoded; `name` is what the error calls it.
+pub fn range_png(panorama: &Panorama, name: &str) -> Result<Vec<u8>> {
+    // The cast saturates: below zero at 0, above at 65535.
+    let millimetres = panorama.range_m.iter().map(|r| (f64::from(*r) * 1000.0).round() as u16).collect();
+    encode(buffer::<Luma<u16>>(panorama, millimetres).map(DynamicImage::ImageLuma16), name)
+}
+
+/// The instance ids, 16 bits.
+///
+/// # Errors
+/// When the panorama has no instances or cannot be encoded; `name` is what the error calls it.
+pub fn instance_png(panorama: &Panorama, name: &str) -> Result<Vec<u8>> {
+    encode(buffer::<Luma<u16>>(panorama, panorama.instance.clone()).map(DynamicImage::ImageLuma16), name)
+}
+
+type Buffer<P> = ImageBuffer<P, Vec<<P as image::Pixel>::Subpixel>>;
+
+/// `None` when the data does not fill the panorama.
+fn buffer<P: image::Pixel>(panorama: &Panorama, data: Vec<P::Subpixel>) -> Option<Buffer<P>> {
+    let (width, height) = (panorama.projection.width, panorama.projection.height);
+    (data.len() == panorama.projection.pixels() * usize::from(P::CHANNEL_COUNT))
+        .then(|| ImageBuffer::from_raw(width, height, data))
+        .flatten()
+}
+
+fn encode(image: Option<DynamicImage>, name: &str) -> Result<Vec<u8>> {
+    let image = image.ok_or_else(|| Error::Invalid {
+        what: format!("panorama for {name}"),
+        found: "a channel of another size than the panorama".into(),
+        allowed: "a value for every pixel".into(),
+    })?;
+    let mut bytes = Cursor::new(Vec::new());
+    image.write_to(&mut bytes, ImageFormat::Png).map_err(|source| Error::Image { path: Path::new(name).to_owned(), source })?;
+    Ok(bytes.into_inner())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::panorama::Projection;
+
+    #[test]
+    fn channels_survive_the_file() {
+        let mut panorama = Panorama::black(Projection::new(4, 2));
+        panorama.rgba[4..8].copy_from_slice(&[10, 20, 30, 255]);
+        panorama.range_m[1] = 1.2346;
+        panorama.range_m[2] = 99.0;
+        panorama.instance[3] = 700;
+        let load = |bytes: Vec<u8>| image::load_from_memory(&bytes).unwrap();
+        assert_eq!(load(colours_png(&panorama, "rgb").unwrap()).to_rgb8().get_pixel(1, 0).0, [10, 20, 30]);
+        let range = load(range_png(&panorama, "range").unwrap());
+        assert_eq!(range.as_luma16().unwrap().as_raw()[..4], [0, 1235, 65535, 0]);
+        let instance = load(instance_png(&panorama, "instance").unwrap());
+        assert_eq!(instance.as_luma16().unwrap().get_pixel(3, 0).0, [700]);
+        panorama.range_m.clear();
+        assert!(range_png(&panorama, "range").is_err());
+    }
+}

@@ -1,0 +1,159 @@
+//! Results for a person to read in a terminal.
+
+use std::fmt::Write;
+use std::path::Path;
+
+use crate::episode::open_loop::DriveSummary;
+use crate::episode::{Outcome, PoseRecord, Summary};
+use crate::study::seeds::{SeedsSummary, Spread};
+
+/// One run.
+#[must_use]
+pub fn run(summary: &Summary, folder: &Path) -> String {
+    let s = summary;
+    let distance = centimetres(s.final_distance_m);
+    let headline = match s.outcome {
+        Outcome::Home => format!("home: {distance} from it after {:.1} s", s.time_s),
+        Outcome::Timeout => format!("not home: out of time after {:.1} s, {distance} from it", s.time_s),
+        Outcome::Lost if s.claimed_home => format!("not home: claimed to be after {:.1} s, {distance} from it", s.time_s),
+        Outcome::Lost => format!("not home: lost after {:.1} s, {distance} from it", s.time_s),
+        Outcome::Stuck => format!("not home: stuck after {:.1} s, {distance} from it", s.time_s),
+    };
+    let mut rows: Vec<(&str, String)> = Vec::new();
+    if let (Some(ratio), Some(straight)) = (s.time_ratio, s.straight_line_time_s) {
+        rows.push(("time ratio", format!("{ratio:.2} (straight line {straight:.1} s)")));
+    }
+    rows.push((
+        "start",
+        format!(
+            "{:.2} m from home: ({:.3}, {:.3}) m, {:.1} deg",
+            s.start_distance_m,
+            s.start.x_m,
+            s.start.y_m,
+            s.start.heading_rad.to_degrees()
+        ),
+    ));
+    rows.push(("path", format!("{:.2} m, {} collisions", s.path_length_m, s.collisions)));
+    rows.push(("odometry drift", centimetres(s.odometry_drift_m)));
+    if let Some(e) = &s.estimate {
+        let angles = |bearing: f64, heading: f64| {
+            format!("bearing {:.2} deg, heading {:.2} deg", bearing.to_degrees(), heading.to_degrees())
+        };
+        rows.push((
+            "estimate, end",
+            format!("range {}, {}", centimetres(e.range_error_m), angles(e.bearing_error_rad, e.heading_error_rad)),
+        ));
+        rows.push((
+            "estimate, RMSE",
+            format!("range {}, {}", centimetres(e.range_rmse_m), angles(e.bearing_rmse_rad, e.heading_rmse_rad)),
+        ));
+        if let Some(nees) = e.nees {
+            rows.push(("NEES", format!("{nees:.2} (3 is consistent)")));
+        }
+    }
+    let l = &s.landmarks;
+    rows.push((
+        "bearings a step",
+        format!("{:.1} seen, {:.1} used, {:.1} refused; {} at home", l.seen_mean, l.matched_mean, l.rejected_mean, l.home),
+    ));
+    if let Some(renderer) = &s.renderer {
+        rows.push(("renderer", [&renderer.kind, &renderer.adapter, &renderer.driver].map(String::as_str).join(" ")));
+    }
+    let t = &s.timing;
+    rows.push((
+        "wall time",
+        format!(
+            "{:.2} s ({:.1} x real time): render {:.2}, vision {:.2}, estimation {:.2}, physics {:.2}",
+            t.wall_s, t.real_time_factor, t.render_s, t.vision_s, t.estimation_s, t.physics_s
+        ),
+    ));
+    rows.push(("files", folder.display().to_string()));
+    table(&headline, &rows)
+}
+
+/// An open-loop drive.
+#[must_use]
+pub fn drive(summary: &DriveSummary, folder: &Path) -> String {
+    let s = summary;
+    let pose = |p: &PoseRecord| format!("({:.3}, {:.3}) m, {:.1} deg", p.x_m, p.y_m, p.heading_rad.to_degrees());
+    let mut rows = vec![
+        ("start", pose(&s.start)),
+        ("end", pose(&s.end)),
+        ("end by odometry", pose(&s.odometry_end)),
+        (
+            "odometry drift",
+            format!("{}, {:.2} deg", centimetres(s.odometry_drift_m), s.odometry_heading_drift_rad.to_degrees()),
+        ),
+        ("greatest speed", format!("{:.3} m/s", s.greatest_speed_m_s)),
+        ("greatest slip", format!("{:.4} m/s, mean of a control step", s.greatest_slip_m_s)),
+    ];
+    for hit in &s.collision_list {
+        rows.push(("collision", format!("{:.3} s, {}, {:.3} N s", hit.time_s, hit.with, hit.impulse_n_s)));
+    }
+    rows.push(("files", folder.display().to_string()));
+    table(&format!("drove {:.2} m in {:.1} s", s.path_length_m, s.time_s), &rows)
+}
+
+/// A batch.
+#[must_use]
+pub fn seeds(batch: &SeedsSummary, runs: &[Summary], folder: &Path) -> String {
+    let b = batch;
+    let mut text = format!(
+        "{:>6}  {:<8} {:>8} {:>9} {:>8} {:>6} {:>6}\n",
+        "seed", "outcome", "start m", "final cm", "time s", "ratio", "nees"
+    );
+    for run in runs {
+        let optional = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |v| format!("{v:.2}"));
+        let _ = writeln!(
+            text,
+            "{:>6}  {:<8} {:>8.2} {:>9.2} {:>8.1} {:>6} {:>6}",
+            run.seed,
+            run.outcome.name(),
+            run.start_distance_m,
+            100.0 * run.final_distance_m,
+            run.time_s,
+            optional(run.time_ratio),
+            optional(run.estimate.and_then(|e| e.nees)),
+        );
+    }
+    let [low, high] = b.home_share_95;
+    let headline = format!(
+        "\nhome within {}: {}/{} (95 % Wilson {low:.2}-{high:.2})",
+        centimetres(b.setup.arrival_radius_m),
+        b.home,
+        b.runs
+    );
+    let spread = |s: &Spread, scale: f64, unit: &str| match (s.median, s.p90, s.max) {
+        (Some(median), Some(p90), Some(max)) => {
+            format!("median {:.2}{unit}, 90 % {:.2}{unit}, most {:.2}{unit}", scale * median, scale * p90, scale * max)
+        }
+        _ => "-".to_owned(),
+    };
+    let rows = [
+        ("time ratio", spread(&b.time_ratio, 1.0, "")),
+        ("final distance", spread(&b.final_distance_m, 100.0, " cm")),
+        ("where it claimed home", spread(&b.claimed_distance_m, 100.0, " cm")),
+        ("range error at end", spread(&b.range_error_m, 100.0, " cm")),
+        ("odometry drift", spread(&b.odometry_drift_m, 100.0, " cm")),
+        ("NEES (3 is consistent)", spread(&b.nees, 1.0, "")),
+        ("wrong claims", b.wrong_claims.to_string()),
+        ("timeout, lost, stuck", format!("{}, {}, {}", b.outcomes.timeout, b.outcomes.lost, b.outcomes.stuck)),
+        ("runs with collisions", b.runs_with_collisions.to_string()),
+        ("files", folder.display().to_string()),
+    ];
+    text + &table(&headline, &rows)
+}
+
+fn centimetres(metres: f64) -> String {
+    format!("{:.1} cm", 100.0 * metres)
+}
+
+/// A headline and aligned rows under it.
+fn table(headline: &str, rows: &[(&str, String)]) -> String {
+    let width = rows.iter().map(|(name, _)| name.len()).max().unwrap_or(0);
+    let mut text = format!("{headline}\n");
+    for (name, value) in rows {
+        let _ = writeln!(text, "  {name:width$}  {value}");
+    }
+    text
+}

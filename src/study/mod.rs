@@ -1,0 +1,4 @@
+//! Studies: many episodes, and what they say together.
+
+pub mod seeds;
+pub mod statistics;

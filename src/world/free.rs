@@ -1,0 +1,149 @@
+//! Where a robot may stand: free space, starts, floor friction.
+
+use std::f64::consts::{PI, TAU};
+
+use rand_pcg::rand_core::Rng;
+
+use super::convex::{Convex, gap_to_walls_m};
+use super::polygon::{anticlockwise, bounds, contains};
+use super::{Body, World};
+use crate::error::{Error, Result};
+use crate::geometry::{Pose, Vector2};
+use crate::random::Stream;
+
+/// How many random starts are tried before the world is called too crowded.
+const START_TRIES: u32 = 10_000;
+
+impl World {
+    /// Whether the robot's body at `pose` keeps `margin_m` from the walls and from all bodies that reach down to its height.
+    ///
+    /// `body_poses` are in the order of [`World::bodies`]; [`World::body_poses`] gives those at time 0.
+    ///
+    /// # Errors
+    /// What is in the way, in words: `wall 2`, `desk`.
+    pub fn is_free(&self, pose: &Pose, margin_m: f64, body_poses: &[Pose]) -> std::result::Result<(), String> {
+        let disc = Convex::disc(pose.position(), self.spec.robot.radius_m + margin_m);
+        self.first_in_the_way(&disc, self.bodies.iter().zip(body_poses))
+    }
+
+    /// Whether the robot can drive straight from `from` to `to`, past walls and standing bodies, those that could be pushed away
+    /// included. Bodies that move by themselves don't count.
+    ///
+    /// # Errors
+    /// What is in the way, in words.
+    pub fn is_corridor_free(&self, from: Vector2<f64>, to: Vector2<f64>) -> std::result::Result<(), String> {
+        let corridor = Convex::corridor(from, to, self.spec.robot.radius_m);
+        let standing = self.bodies.iter().filter(|b| b.stands());
+        self.first_in_the_way(&corridor, standing.map(|b| (b, &b.pose)))
+    }
+
+    fn first_in_the_way<'a>(
+        &self,
+        shape: &Convex,
+        bodies: impl Iterator<Item = (&'a Body, &'a Pose)>,
+    ) -> std::result::Result<(), String> {
+        if !contains(&self.outline, shape.middle()) {
+            return Err("the outside of the room".to_owned());
+        }
+        for k in 0..self.outline.len() {
+            let (a, b) = self.wall(k);
+            if shape.gap_m(&Convex::corridor(a, b, 0.0)) < 0.0 {
+                return Err(format!("wall {k}"));
+            }
+        }
+        for (body, pose) in bodies {
+            if body.bottom_m < self.spec.robot.height_m && shape.gap_m(&Convex::of_body(body, pose)) < 0.0 {
+                return Err(body.name.clone());
+            }
+        }
+        Ok(())
+    }
+
+    /// Ends of wall `k`, from corner k to corner k + 1, m.
+    #[must_use]
+    pub fn wall(&self, k: usize) -> (Vector2<f64>, Vector2<f64>) {
+        (self.outline[k], self.outline[(k + 1) % self.outline.len()])
+    }
+
+    /// Distance from `point` to the nearest wall, m; minus infinity outside the room.
+    #[must_use]
+    pub fn distance_to_walls_m(&self, point: Vector2<f64>) -> f64 {
+        gap_to_walls_m(&self.outline, &Convex::disc(point, 0.0))
+    }
+
+    /// Coulomb friction of the floor at a point: that of the last zone around it, else the floor's own.
+    #[must_use]
+    pub fn friction_at(&self, point: Vector2<f64>) -> f64 {
+        self.zones.iter().rev().find(|z| contains(&z.polygon, point)).map_or(self.spec.floor.friction, |z| z.friction)
+    }
+
+    /// Draws a start: uniform over the start region (or the room) between the least and greatest distance from home, any
+    /// heading. The robot stands free there with the start's clearance, and nothing that stands still is in its straight way
+    /// home.
+    ///
+    /// # Errors
+    /// When 10,000 draws find no such place; the message names what was most often in the way.
+    pub fn random_start(&self, stream: &mut Stream) -> Result<Pose> {
+        let start = &self.spec.start;
+        let region = start.region_m.as_deref().map_or_else(|| self.outline.clone(), anticlockwise);
+        let (low, high) = bounds(&region);
+        let poses = self.body_poses();
+        let mut refusals: std::collections::BTreeMap<String, u32> = std::collections::BTreeMap::new();
+        for _ in 0..START_TRIES {
+            // Three numbers a try, whatever becomes of it: the stream's position tells the number of tries.
+            let [u, v, turn] = [uniform(stream), uniform(stream), uniform(stream)];
+            let point = Vector2::new(low.x + u * (high.x - low.x), low.y + v * (high.y - low.y));
+            let pose = Pose::new(point.x, point.y, TAU * turn - PI);
+            let distance_m = (point - self.home.position()).norm();
+            let refusal = if !contains(&region, point) {
+                continue;
+            } else if distance_m < start.min_distance_m || distance_m > start.max_distance_m {
+                Err("the distance from home".to_owned())
+            } else {
+                self.is_free(&pose, start.clearance_m, &poses).and_then(|()| self.is_corridor_free(point, self.home.position()))
+            };
+            match refusal {
+                Ok(()) => return Ok(pose),
+                Err(reason) => *refusals.entry(reason).or_default() += 1,
+            }
+        }
+        let worst = refusals.iter().max_by_key(|(_, count)| **count);
+        Err(Error::Invalid {
+            what: format!("random start in world {}", self.spec.name),
+            found: format!(
+                "no free place in {START_TRIES} tries{}",
+                worst.map_or_else(String::new, |(reason, count)| format!("; {count} times {reason} was in the way"))
+            ),
+            allowed: format!(
+                "a start region with free places {} to {} m from home, {} m of clearance and a straight free way home",
+                start.min_distance_m, start.max_distance_m, start.clearance_m
+            ),
+        })
+    }
+
+    /// The start called `name` in the world file.
+    ///
+    /// # Errors
+    /// When there is none; the message lists the names that exist.
+    pub fn named_start(&self, name: &str) -> Result<Pose> {
+        let named = &self.spec.start.named;
+        named.iter().find(|n| n.name == name).map(|n| Pose::new(n.x_m, n.y_m, n.heading_deg.to_radians())).ok_or_else(|| {
+            let names: Vec<_> = named.iter().map(|n| n.name.as_str()).collect();
+            Error::Invalid {
+                what: format!("start in world {}", self.spec.name),
+                found: name.to_owned(),
+                allowed: if names.is_empty() {
+                    "random, or x,y,heading_deg; this world has no named starts".to_owned()
+                } else {
+                    format!("random, x,y,heading_deg, or one of {}", names.join(", "))
+                },
+            }
+        })
+    }
+}
+
+/// A number in [0, 1) with 53 random bits.
+fn uniform(stream: &mut Stream) -> f64 {
+    const STEP: f64 = 1.0 / (1_u64 << 53) as f64;
+    (stream.next_u64() >> 11) as f64 * STEP
+}

@@ -1,0 +1,331 @@
+//! The command at its process boundary: what it prints, writes and exits with.
+
+#![allow(clippy::unwrap_used, reason = "helpers of tests are not recognised as tests")]
+
+use std::path::Path;
+use std::process::{Command, Output};
+
+use serde_json::Value;
+
+const LAB: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/worlds/lab.toml");
+
+/// `wayhome` with the given arguments, in `folder`.
+fn wayhome(folder: &Path, arguments: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_wayhome"));
+    command.current_dir(folder).args(arguments).env_remove("RUST_LOG");
+    command
+}
+
+fn run(folder: &Path, arguments: &[&str]) -> Output {
+    wayhome(folder, arguments).output().unwrap()
+}
+
+fn stderr(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+/// Checks that a command fails with the code, says all of `words`, prints no result and does not panic.
+#[track_caller]
+fn assert_fails(output: &Output, code: i32, words: &[&str]) {
+    let text = stderr(output);
+    assert_eq!(output.status.code(), Some(code), "{text}");
+    assert!(!text.contains("panicked"), "{text}");
+    for word in words {
+        assert!(text.contains(word), "`{word}` is not in: {text}");
+    }
+    assert!(output.stdout.is_empty(), "a failure prints no result: {}", String::from_utf8_lossy(&output.stdout));
+}
+
+#[track_caller]
+fn assert_done(output: &Output) {
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(output));
+}
+
+#[test]
+fn bad_worlds_are_explained() {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
+    let lab = std::fs::read_to_string(LAB).unwrap();
+    write("broken.toml", "name = \"lab\n[room");
+    write("unknown.toml", &lab.replace("[room]", "[room]\nceiling_height = 3"));
+    write("walled.toml", &lab.replace("x_m = 3.4", "x_m = 0.0"));
+
+    assert_fails(&run(folder.path(), &["home", "missing.toml"]), 2, &["missing.toml"]);
+    assert_fails(&run(folder.path(), &["world", "check", "broken.toml"]), 1, &["broken.toml", "1"]);
+    assert_fails(&run(folder.path(), &["world", "check", "unknown.toml"]), 1, &["unknown.toml", "ceiling_height"]);
+    assert_fails(&run(folder.path(), &["world", "check", "walled.toml"]), 1, &["walled.toml", "home"]);
+    assert_fails(&run(folder.path(), &["render", "unknown.toml", "--pose", "1,1,0"]), 1, &["ceiling_height"]);
+    assert!(!folder.path().join("results").exists(), "a failure leaves no folder behind");
+}
+
+#[test]
+fn bad_values_are_usage_errors() {
+    let folder = tempfile::tempdir().unwrap();
+    let home = |more: &[&str]| run(folder.path(), &[&["home", LAB], more].concat());
+    for size in ["0x0", "1440", "15x64", "100000x64", "-1x8"] {
+        assert_fails(&home(&[&format!("--size={size}")]), 2, &["--size"]);
+    }
+    for pose in ["1,2", "1,2,NaN", "1,2,east", "1,2,3,4"] {
+        assert_fails(&run(folder.path(), &["render", LAB, "--pose", pose]), 2, &["--pose"]);
+    }
+    assert_fails(&home(&["--seeds", "9..1"]), 2, &["--seeds"]);
+    assert_fails(&home(&["--threads", "0"]), 2, &["--threads"]);
+    assert_fails(&home(&["--time-limit-s", "-1"]), 2, &["--time-limit-s"]);
+    assert_fails(&home(&["--plant", "hovercraft"]), 2, &["rapier", "unicycle"]);
+    assert_fails(&home(&["--noise-deg", "1"]), 2, &["--bearings noisy"]);
+    assert_fails(&home(&["--bearings", "ideal", "--size", "64x32"]), 2, &["--bearings rendered"]);
+    assert_fails(&home(&["--bearings", "ideal", "--start", "nowhere"]), 2, &["nowhere"]);
+    assert_fails(&run(folder.path(), &[]), 2, &["Usage"]);
+    assert!(!folder.path().join("results").exists(), "a failure leaves no folder behind");
+}
+
+#[test]
+fn places_where_nothing_can_stand_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let home = |start: &str| run(folder.path(), &["home", LAB, "--bearings", "ideal", "--start", start]);
+    assert_fails(&home("0.05,3,0"), 2, &["start", "wall"]);
+    assert_fails(&home("-5,3,0"), 2, &["start", "room"]);
+    let render = |pose: &str| run(folder.path(), &["render", LAB, "--pose", pose]);
+    assert_fails(&render("-1,3,0"), 2, &["--pose", "outside the room"]);
+    let world: toml::Table = toml::from_str(&std::fs::read_to_string(LAB).unwrap()).unwrap();
+    let pillar = world["landmarks"].as_array().unwrap().iter().find(|b| b["name"].as_str() == Some("pillar")).unwrap();
+    let (x, y) = (&pillar["position_m"][0], &pillar["position_m"][1]);
+    assert_fails(&home(&format!("{x},{y},0")), 2, &["start", "pillar"]);
+    assert_fails(&render(&format!("{x},{y},0")), 2, &["--pose", "pillar"]);
+}
+
+#[test]
+fn folders_that_cannot_be_written_are_named() {
+    let folder = tempfile::tempdir().unwrap();
+    // Below a regular file no folder can be made, whoever asks.
+    std::fs::write(folder.path().join("file"), "").unwrap();
+    let below = run(folder.path(), &["home", LAB, "--bearings", "ideal", "--out", "file/below"]);
+    assert_fails(&below, 1, &["file/below"]);
+    std::fs::create_dir(folder.path().join("mine")).unwrap();
+    std::fs::write(folder.path().join("mine/summary.json"), "mine").unwrap();
+    let taken = run(folder.path(), &["home", LAB, "--bearings", "ideal", "--out", "mine"]);
+    assert_fails(&taken, 1, &["mine", "summary.json", "--out"]);
+    assert_eq!(std::fs::read(folder.path().join("mine/summary.json")).unwrap(), b"mine");
+}
+
+#[test]
+fn no_adapter_is_no_panic() {
+    let folder = tempfile::tempdir().unwrap();
+    // No driver file, no Vulkan adapter; the other back ends do not exist where these variables mean anything.
+    for verb in [&["render", LAB, "--pose", "3,3,0"][..], &["home", LAB]] {
+        let mut command = wayhome(folder.path(), verb);
+        command.args(["--renderer", "gpu"]).env("VK_DRIVER_FILES", "/nonexistent.json");
+        command.env("VK_ICD_FILENAMES", "/nonexistent.json").env_remove("VK_ADD_DRIVER_FILES");
+        let output = command.output().unwrap();
+        if cfg!(target_os = "linux") {
+            assert_fails(&output, 1, &["no graphics adapter", "--renderer cpu"]);
+        }
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn ctrl_c_ends_in_good_order() {
+    let folder = tempfile::tempdir().unwrap();
+    let arguments = ["home", LAB, "--bearings", "noisy", "--seeds", "1..90000", "--out", "batch"];
+    let mut child = wayhome(folder.path(), &arguments).stderr(std::process::Stdio::piped()).spawn().unwrap();
+    // The folder is opened once the handler is in place.
+    let marker = folder.path().join("batch/.wayhome");
+    let deadline = std::time::Instant::now() + std::time::Duration::from_secs(20);
+    while !marker.exists() {
+        assert!(std::time::Instant::now() < deadline, "the batch does not start");
+        std::thread::sleep(std::time::Duration::from_millis(10));
+    }
+    let killed = Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+    assert!(killed.success());
+    let status = child.wait().unwrap();
+    assert_eq!(status.code(), Some(130));
+    let held: Vec<_> = std::fs::read_dir(folder.path().join("batch")).unwrap().map(|e| e.unwrap().file_name()).collect();
+    assert_eq!(held, [".wayhome"], "nothing half done is left");
+}
+
+/// The summary of a finished run without what may differ from run to run.
+fn summary(folder: &Path) -> Value {
+    let text = std::fs::read_to_string(folder.join("summary.json")).unwrap();
+    let mut summary: Value = serde_json::from_str(&text).unwrap();
+    summary.as_object_mut().unwrap().remove("timing").expect("a summary has timings");
+    summary
+}
+
+#[test]
+fn a_run_comes_home_and_says_so() {
+    let folder = tempfile::tempdir().unwrap();
+    let arguments = ["home", LAB, "--plant", "unicycle", "--bearings", "ideal", "--seed", "3", "--json", "--out", "run"];
+    let output = run(folder.path(), &arguments);
+    assert_done(&output);
+    assert_eq!(stderr(&output), "", "no progress where stderr is no terminal");
+    let printed: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let summary = summary(&folder.path().join("run"));
+    for (key, value) in summary.as_object().unwrap() {
+        assert_eq!(&printed[key], value, "{key}");
+    }
+    assert_eq!(summary["outcome"], "home");
+    assert!(summary["final_distance_m"].as_f64().unwrap() <= 0.05);
+    assert!(summary["time_ratio"].as_f64().unwrap() >= 0.9);
+    assert_eq!(summary["renderer"], Value::Null);
+
+    // What the summary says must follow from the trajectory beside it.
+    let text = std::fs::read_to_string(folder.path().join("run/trajectory.csv")).unwrap();
+    let rows: Vec<Vec<&str>> = text.lines().map(|l| l.split(',').collect()).collect();
+    assert_eq!(rows[0][..4], ["t_s", "x_m", "y_m", "heading_rad"]);
+    assert!(rows.iter().all(|r| r.len() == rows[0].len()));
+    let number = |row: &[&str], column: usize| row[column].parse::<f64>().unwrap();
+    let (first, last) = (&rows[1], &rows[rows.len() - 1]);
+    assert_eq!(number(first, 0), 0.0);
+    assert_eq!(summary["start"]["x_m"].as_f64().unwrap(), number(first, 1));
+    let home = |axis: &str| summary["home"][axis].as_f64().unwrap();
+    let distance = (number(last, 1) - home("x_m")).hypot(number(last, 2) - home("y_m"));
+    assert!((summary["final_distance_m"].as_f64().unwrap() - distance).abs() < 1e-12);
+    assert!(std::fs::read_to_string(folder.path().join("run/path.svg")).unwrap().contains("<svg"));
+}
+
+#[test]
+fn a_run_that_does_not_come_home_exits_with_3() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = run(folder.path(), &["home", LAB, "--bearings", "ideal", "--time-limit-s", "1"]);
+    assert_eq!(output.status.code(), Some(3), "{}", stderr(&output));
+    assert!(String::from_utf8_lossy(&output.stdout).contains("out of time"));
+    assert_eq!(summary(&folder.path().join("results/runs/home-lab-0"))["outcome"], "timeout");
+}
+
+#[test]
+fn a_seed_gives_the_same_bytes_on_any_number_of_threads() {
+    let folder = tempfile::tempdir().unwrap();
+    let files = |sensor: &[&str], threads: &str, out: &str| {
+        let common =
+            ["home", LAB, "--seed", "7", "--time-limit-s", "3", "--renderer", "cpu", "--threads", threads, "--out", out];
+        let output = run(folder.path(), &[&common, sensor].concat());
+        assert!(matches!(output.status.code(), Some(0 | 3)), "{}", stderr(&output));
+        let path = folder.path().join(out);
+        (std::fs::read(path.join("trajectory.csv")).unwrap(), summary(&path))
+    };
+    for sensor in [&["--bearings", "noisy"][..], &["--bearings", "rendered", "--size", "720x90"]] {
+        let first = files(sensor, "1", "a");
+        assert!(first.0.len() > 1000, "a trajectory of some steps");
+        assert_eq!(first, files(sensor, "1", "a"), "a second time, in the same folder");
+        assert_eq!(first, files(sensor, "2", "b"), "on two threads");
+    }
+}
+
+#[test]
+fn a_batch_counts_its_runs() {
+    let folder = tempfile::tempdir().unwrap();
+    let batch = |threads: &str, out: &str| {
+        let output = run(
+            folder.path(),
+            &["home", LAB, "--bearings", "noisy", "--seeds", "1..6", "--threads", threads, "--json", "--out", out],
+        );
+        assert_done(&output);
+        let rows = std::fs::read_to_string(folder.path().join(out).join("seeds.csv")).unwrap();
+        (rows, serde_json::from_slice::<Value>(&output.stdout).unwrap())
+    };
+    let (rows, printed) = batch("1", "one");
+    assert_eq!(rows.lines().count(), 7);
+    let home = rows.lines().filter(|l| l.split(',').nth(1) == Some("home")).count();
+    assert_eq!((printed["runs"].as_u64(), printed["home"].as_u64()), (Some(6), Some(home as u64)));
+    assert_eq!(printed["per_seed"].as_array().unwrap().len(), 6);
+    assert_eq!(rows, batch("2", "two").0, "on two threads");
+
+    // A seed gives the same run alone and in a batch.
+    run(folder.path(), &["home", LAB, "--bearings", "noisy", "--seed", "4", "--out", "single"]);
+    let alone = summary(&folder.path().join("single"));
+    let mut within = printed["per_seed"][3].clone();
+    within.as_object_mut().unwrap().remove("timing");
+    assert_eq!(alone, within);
+}
+
+#[test]
+fn a_panorama_comes_with_its_truth() {
+    let folder = tempfile::tempdir().unwrap();
+    let output =
+        run(folder.path(), &["render", LAB, "--pose", "3,3,90", "--size", "256x64", "--renderer", "cpu", "--out", "view"]);
+    assert_done(&output);
+    let path = folder.path().join("view");
+    let open = |name: &str| image::open(path.join(name)).unwrap();
+    let (colours, range, instance) = (open("rgb.png"), open("range.png"), open("instance.png"));
+    assert_eq!((colours.width(), colours.height()), (256, 64));
+    let (range, instance) = (range.as_luma16().unwrap(), instance.as_luma16().unwrap());
+    let meta: Value = serde_json::from_str(&std::fs::read_to_string(path.join("meta.json")).unwrap()).unwrap();
+    let known: Vec<u64> = meta["instances"].as_array().unwrap().iter().map(|i| i["id"].as_u64().unwrap()).collect();
+    assert!(instance.pixels().all(|p| known.contains(&u64::from(p.0[0]))), "every instance has a name");
+    assert!(range.pixels().all(|p| (200..10_000).contains(&p.0[0])), "ranges of a room, in mm");
+    assert_eq!(meta["pose"]["heading_rad"].as_f64(), Some(std::f64::consts::FRAC_PI_2));
+    // The bottom row looks at the floor, at a range that the camera's height and the row's elevation fix.
+    let projection = &meta["projection"];
+    let tan = (projection["horizon_row"].as_f64().unwrap() - 63.5) * std::f64::consts::TAU / 256.0;
+    let expected_mm = 1000.0 * meta["camera_height_m"].as_f64().unwrap() * (1.0 + tan * tan).sqrt() / -tan;
+    let floor = meta["instances"].as_array().unwrap().iter().find(|i| i["name"] == "floor").unwrap()["id"].as_u64();
+    for (range, _) in range
+        .rows()
+        .next_back()
+        .unwrap()
+        .zip(instance.rows().next_back().unwrap())
+        .filter(|(_, i)| Some(u64::from(i.0[0])) == floor)
+    {
+        assert!((f64::from(range.0[0]) - expected_mm).abs() < 2.0, "{} mm, expected {expected_mm}", range.0[0]);
+    }
+}
+
+#[test]
+fn worlds_can_be_checked_drawn_and_described() {
+    let folder = tempfile::tempdir().unwrap();
+    let check = run(folder.path(), &["world", "check", LAB]);
+    assert_done(&check);
+    assert!(String::from_utf8_lossy(&check.stdout).starts_with("OK: lab"));
+    let plot = run(folder.path(), &["world", "plot", LAB]);
+    assert_done(&plot);
+    assert!(String::from_utf8_lossy(&plot.stdout).contains("<svg"));
+    assert_done(&run(folder.path(), &["world", "plot", LAB, "--out", "map.svg"]));
+    assert_eq!(std::fs::read(folder.path().join("map.svg")).unwrap(), plot.stdout);
+    let schema = run(folder.path(), &["world", "schema"]);
+    assert_done(&schema);
+    let schema: Value = serde_json::from_slice(&schema.stdout).unwrap();
+    assert!(schema["properties"]["room"].is_object(), "{schema}");
+}
+
+#[test]
+fn a_table_of_commands_is_driven_and_recorded() {
+    let folder = tempfile::tempdir().unwrap();
+    let table = |name: &str, rows: &str| {
+        std::fs::write(folder.path().join(name), format!("t_s,v_m_s,omega_rad_s\n{rows}")).unwrap();
+    };
+    table("turn.csv", "0,0.25,0\n1,0.2,0.8\n3.05,0,0\n");
+    let drive = |out: &str| {
+        let output = run(folder.path(), &["drive", LAB, "--commands", "turn.csv", "--seed", "5", "--json", "--out", out]);
+        assert_done(&output);
+        let read = |name: &str| std::fs::read_to_string(folder.path().join(out).join(name)).unwrap();
+        (read("drive.csv"), read("summary.json"), read("path.svg"))
+    };
+    let (csv, summary, drawing) = drive("first");
+    assert_eq!((csv.clone(), summary.clone(), drawing.clone()), drive("second"), "same seed, same bytes");
+    assert!(drawing.contains("<svg") && drawing.contains("odometry"));
+
+    // What the summary says must follow from the table beside it.
+    let summary: Value = serde_json::from_str(&summary).unwrap();
+    let rows: Vec<Vec<&str>> = csv.lines().map(|l| l.split(',').collect()).collect();
+    let column = |name: &str| rows[0].iter().position(|c| *c == name).expect(name);
+    let number = |row: &[&str], name: &str| row[column(name)].parse::<f64>().unwrap();
+    assert_eq!(rows.len(), 1 + 1 + 10 + 21, "a header, the start, and an interval of at most 0.1 s each");
+    let last = rows.last().unwrap();
+    assert_eq!((number(last, "t_s"), summary["time_s"].as_f64()), (3.05, Some(3.05)));
+    let drift = (number(last, "x_odom_m") - number(last, "x_m")).hypot(number(last, "y_odom_m") - number(last, "y_m"));
+    assert!((summary["odometry_drift_m"].as_f64().unwrap() - drift).abs() < 1e-12 && drift > 0.0);
+    // Forces over an interval make the momentum gained in it: here straight ahead, from rest.
+    let mass = 2.3;
+    let force: f64 = ["left", "right", "caster"].iter().map(|w| number(&rows[2], &format!("force_{w}_forward_n"))).sum();
+    let gained = mass * number(&rows[2], "v_forward_m_s");
+    assert!((force * 0.1 / gained - 1.0).abs() < 1e-3, "{force} N for 0.1 s against {gained} N s");
+
+    table("gap.csv", "0,0.25,0\n\n3,0,0\n");
+    table("back.csv", "0,0.25,0\n2,0.1,0\n1,0,0\n");
+    for (name, words) in [("gap.csv", ["gap.csv", "line 3", "blank"]), ("back.csv", ["back.csv", "line 4", "t_s"])] {
+        assert_fails(&run(folder.path(), &["drive", LAB, "--commands", name]), 1, &words);
+    }
+    assert_fails(&run(folder.path(), &["drive", LAB]), 2, &["--commands"]);
+    assert!(!folder.path().join("results").exists(), "a failure leaves no folder behind");
+}
