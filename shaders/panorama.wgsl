@@ -65,22 +65,19 @@ fn render(@builtin(global_invocation_id) id: vec3<u32>) {
                 side = new_side(hits[owner], direction);
                 side_of = owner;
             }
-            let z = params.camera_height + t * row.tan;
-            colour = pack(sample_strip(side.strip, z - side.foot), side_light(side, z));
+            colour = shade_side(side, r);
             range = t * row.stretch;
             instance = hits[owner].surface + 1u;
         } else if t < FAR {
-            let ceiling = row.tan >= 0.0;
-            var plane: Plane;
-            if owner == FLOOR_OR_CEILING {
-                plane = plane_of_room(ceiling);
-                instance = select(1u, 2u, ceiling);
-            } else {
-                plane = plane_of_body(hits[owner], face == TOP);
-                instance = hits[owner].surface + 1u;
+            var surface = select(0u, 1u, row.tan >= 0.0);
+            var underside = row.tan >= 0.0;
+            if owner != FLOOR_OR_CEILING {
+                surface = hits[owner].surface;
+                underside = face == UNDERSIDE;
             }
-            colour = shade_plane(plane, direction, t, row.inverse_tan);
+            colour = shade_plane(new_plane(surface, underside), direction, t, row.inverse_tan);
             range = t * row.stretch;
+            instance = surface + 1u;
         }
         let pixel = r * params.width + column;
         picture[pixel] = colour;

@@ -1,4 +1,8 @@
 // Prefiltered texture sampling. The twin of src/render/sample.rs.
+//
+// Coordinates are in 1/65536 texel of the finest level, and may wrap around.
+
+const ROUNDER: f32 = 12582912.0;
 
 struct Material {
     base: u32,
@@ -10,14 +14,20 @@ struct Material {
 @group(0) @binding(6) var<storage, read> materials: array<Material>;
 @group(0) @binding(7) var<storage, read> atlas: array<u32>;
 
+fn round_small(x: f32) -> i32 {
+    return bitcast<i32>(x + ROUNDER) - bitcast<i32>(ROUNDER);
+}
+
 fn level(material: Material, a_m: f32, b_m: f32) -> i32 {
     let footprint = max(0.5 * max(a_m, b_m), min(a_m, b_m)) * material.texels_per_m;
-    let logarithm = (bitcast<i32>(footprint) - 0x3f800000) >> 15u;
+    let logarithm = (bitcast<i32>(footprint) - bitcast<i32>(1.0)) >> 15u;
     return clamp(logarithm, 0, 256 * i32(material.log2_size));
 }
 
-fn fixed(coordinate_m: f32, material: Material) -> i32 {
-    return i32(coordinate_m * (material.texels_per_m * 256.0));
+fn within_tile(length_m: f32, material: Material) -> f32 {
+    let size = f32(1u << material.log2_size);
+    let texels = length_m * material.texels_per_m;
+    return texels - size * floor(texels / size);
 }
 
 fn level_base(material: Material, level: u32) -> u32 {
@@ -25,28 +35,20 @@ fn level_base(material: Material, level: u32) -> u32 {
     return material.base + ((4u << finest) - (4u << (finest - 2u * level))) / 3u;
 }
 
+fn on_level(coordinate: i32, level: u32) -> i32 {
+    return (coordinate >> (8u + level)) - 128;
+}
+
 // Red and blue, then green and alpha, 16 bits each.
 fn unpack(texel: u32) -> vec2<u32> {
     return vec2<u32>(texel, texel >> 8u) & vec2<u32>(0x00ff00ffu);
 }
 
-fn mix_pairs(a: vec2<u32>, b: vec2<u32>, weight: u32) -> vec2<u32> {
+fn mix_channels(a: vec2<u32>, b: vec2<u32>, weight: u32) -> vec2<u32> {
     return ((a * (256u - weight) + b * weight + vec2<u32>(0x00800080u)) >> vec2<u32>(8u)) & vec2<u32>(0x00ff00ffu);
 }
 
-struct Axis {
-    first: u32,
-    second: u32,
-    weight: u32,
-}
-
-fn axis(coordinate: i32, level: u32, log2_size: u32) -> Axis {
-    let at = (coordinate >> level) - 128;
-    let mask = (1u << (log2_size - level)) - 1u;
-    let texel = u32(at >> 8u);
-    return Axis(texel & mask, (texel + 1u) & mask, u32(at & 255));
-}
-
+// A level with u fixed: two lines of texels along v, and the weight of the second.
 struct Lines {
     first: u32,
     second: u32,
@@ -56,37 +58,45 @@ struct Lines {
 
 fn new_lines(material: Material, level: u32, u: i32) -> Lines {
     let base = level_base(material, level);
-    let a = axis(u, level, material.log2_size);
     let shift = material.log2_size - level;
-    return Lines(base + (a.first << shift), base + (a.second << shift), a.weight, level);
+    let mask = (1u << shift) - 1u;
+    let at = on_level(u, level);
+    let line = u32(at >> 8u);
+    return Lines(base + ((line & mask) << shift), base + (((line + 1u) & mask) << shift), u32(at & 255), level);
 }
 
 fn sample_lines(lines: Lines, log2_size: u32, v: i32) -> vec2<u32> {
-    let b = axis(v, lines.level, log2_size);
-    let near = mix_pairs(unpack(atlas[lines.first + b.first]), unpack(atlas[lines.second + b.first]), lines.weight);
-    let far = mix_pairs(unpack(atlas[lines.first + b.second]), unpack(atlas[lines.second + b.second]), lines.weight);
-    return mix_pairs(near, far, b.weight);
+    let mask = (1u << (log2_size - lines.level)) - 1u;
+    let at = on_level(v, lines.level);
+    let low = u32(at >> 8u) & mask;
+    let high = (low + 1u) & mask;
+    let near = mix_channels(unpack(atlas[lines.first + low]), unpack(atlas[lines.second + low]), lines.weight);
+    let far = mix_channels(unpack(atlas[lines.first + high]), unpack(atlas[lines.second + high]), lines.weight);
+    return mix_channels(near, far, u32(at & 255));
 }
 
 struct Strip {
-    material: Material,
+    log2_size: u32,
     fine: Lines,
     coarse: Lines,
     weight: u32,
+    v: i32,
+    step: i32,
 }
 
-fn new_strip(material: Material, u_m: f32, level: i32) -> Strip {
-    let u = fixed(u_m, material);
+// A texture with u and level of detail fixed.
+fn new_strip(material: Material, u: i32, v: i32, step: i32, level: i32) -> Strip {
     let fine = u32(level >> 8u);
     let coarse = min(fine + 1u, material.log2_size);
-    return Strip(material, new_lines(material, fine, u), new_lines(material, coarse, u), u32(level & 255));
+    let weight = u32(level & 255);
+    return Strip(material.log2_size, new_lines(material, fine, u), new_lines(material, coarse, u), weight, v, step);
 }
 
-fn sample_strip(strip: Strip, v_m: f32) -> vec2<u32> {
-    let v = fixed(v_m, strip.material);
-    let fine = sample_lines(strip.fine, strip.material.log2_size, v);
+fn sample_strip(strip: Strip, row: u32) -> vec2<u32> {
+    let v = strip.v + strip.step * i32(row);
+    let fine = sample_lines(strip.fine, strip.log2_size, v);
     if strip.weight == 0u {
         return fine;
     }
-    return mix_pairs(fine, sample_lines(strip.coarse, strip.material.log2_size, v), strip.weight);
+    return mix_channels(fine, sample_lines(strip.coarse, strip.log2_size, v), strip.weight);
 }

@@ -38,9 +38,9 @@ impl Hit {
 /// What a ray sees of a hit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Face {
-    Side,
-    Top,
-    Underside,
+    Side = 0,
+    Top = 1,
+    Underside = 2,
 }
 
 fn dot(a: [f32; 2], b: [f32; 2]) -> f32 {

@@ -22,7 +22,7 @@ use crate::panorama::Panorama;
 /// Most rows in a band: the unit of work of a thread.
 const BAND: usize = RUN;
 /// Columns of a tile.
-const TILE: usize = 16;
+const TILE: usize = 32;
 /// Colour where there is nothing.
 const VOID: u32 = 0xff00_0000;
 
@@ -41,9 +41,17 @@ impl CpuRenderer {
     /// A renderer; its buffers grow with the first picture.
     #[must_use]
     pub fn new() -> Self {
-        let info = RendererInfo { kind: "cpu".to_owned(), adapter: std::env::consts::ARCH.to_owned(), driver: String::new() };
+        let info = RendererInfo { kind: "cpu".to_owned(), adapter: instruction_set().to_owned(), driver: String::new() };
         Self { info, frame: Frame::new(), hits: ColumnHits::default() }
     }
+}
+
+fn instruction_set() -> &'static str {
+    #[cfg(target_arch = "x86_64")]
+    if is_x86_feature_detected!("avx2") {
+        return "x86_64 with AVX2";
+    }
+    std::env::consts::ARCH
 }
 
 impl Default for CpuRenderer {
@@ -65,8 +73,8 @@ impl Renderer for CpuRenderer {
         let (width, height) = (view.projection.width as usize, view.projection.height as usize);
         let rows = height.div_ceil(height.div_ceil(BAND));
         let size = rows * width;
-        let paint = |(k, ((rgba, range), instance)): BandBuffers<'_>| {
-            Band { scene, frame, hits, rows: &frame.rows[k * rows..], rgba, range, instance }.paint();
+        let paint_band = |(k, ((rgba, range), instance)): BandBuffers<'_>| {
+            paint(Band { scene, frame, hits, first_row: k * rows, rgba, range, instance });
         };
         // Inside a pool the caller already spreads pictures over the cores.
         if rayon::current_thread_index().is_some() {
@@ -75,14 +83,14 @@ impl Renderer for CpuRenderer {
                 .zip(out.range_m.chunks_mut(size))
                 .zip(out.instance.chunks_mut(size))
                 .enumerate()
-                .for_each(paint);
+                .for_each(paint_band);
         } else {
             out.rgba
                 .par_chunks_mut(4 * size)
                 .zip(out.range_m.par_chunks_mut(size))
                 .zip(out.instance.par_chunks_mut(size))
                 .enumerate()
-                .for_each(paint);
+                .for_each(paint_band);
         }
         Ok(())
     }
@@ -92,208 +100,197 @@ impl Renderer for CpuRenderer {
     }
 }
 
-/// Some whole rows of the picture. `rows` begins with the first of them.
+/// Some whole rows of the picture.
 struct Band<'a> {
     scene: &'a Scene,
     frame: &'a Frame,
     hits: &'a ColumnHits,
-    rows: &'a [Row],
+    first_row: usize,
     rgba: &'a mut [u8],
     range: &'a mut [f32],
     instance: &'a mut [u16],
 }
 
-/// What the rows of one column see: how far away, and which face, as [`owner`] has it.
+/// Code of a face that a pixel shows: four times its surface's number, plus the face.
+fn code(surface: u32, face: Face) -> u32 {
+    4 * surface + face as u32
+}
+
+/// Code of a pixel that would meet floor or ceiling beyond all distance. As an instance it becomes 0.
+const NOTHING: u32 = 4 * 0xffff;
+
+/// The instance that a code stands for.
+#[inline(always)]
+fn instance(code: u32) -> u16 {
+    ((code >> 2) + 1) as u16
+}
+
+/// Whether a code is that of a horizontal surface.
+#[inline(always)]
+fn is_level(code: u32) -> bool {
+    code & 3 != 0
+}
+
+/// What the rows of one column see: how far away, horizontally, and which face.
 #[derive(Clone, Copy)]
 struct Column {
     distance: [f32; BAND],
-    owner: [u32; BAND],
+    code: [u32; BAND],
 }
 
-/// Floor or ceiling, as owner of a row.
-const ROOM: u32 = 1 << 16;
-/// Owner of a row that would meet floor or ceiling beyond all distance.
-const NOTHING: u32 = 2 << 16;
-
-/// Number of a face of a hit, or of the [`ROOM`].
-fn owner(hit: u32, face: Face) -> u32 {
-    4 * hit + face as u32
-}
-
-/// No horizontal surface.
-const NO_PLANE: u32 = u32::MAX;
-
-/// A tile: arrays of its rows.
+/// The same for the columns of a tile, row by row, and the colours.
 struct Tile {
     distance: [[f32; TILE]; BAND],
-    /// Instance and horizontal surface: the surface's number times two, one more for an underside.
-    instance: [[u16; TILE]; BAND],
-    plane: [[u32; TILE]; BAND],
+    code: [[u32; TILE]; BAND],
     colour: [[u32; TILE]; BAND],
 }
 
-impl Band<'_> {
-    fn paint(&mut self) {
-        let width = self.frame.params.width as usize;
-        self.rows = &self.rows[..self.range.len() / width];
-        let mut room = Column { distance: [FAR; BAND], owner: [NOTHING; BAND] };
-        for (k, row) in self.rows.iter().enumerate().filter(|(_, row)| row.plane < FAR) {
-            room.distance[k] = row.plane;
-            room.owner[k] = ROOM + owner(0, if row.tan < 0.0 { Face::Top } else { Face::Underside });
+/// Paints a band, on the widest vector unit at hand: results are the same on all.
+#[multiversion::multiversion(targets("x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"))]
+fn paint(mut band: Band<'_>) {
+    let band = &mut band;
+    let width = band.frame.params.width as usize;
+    let rows = &band.frame.rows[band.first_row..][..band.range.len() / width];
+    let mut room = Column { distance: [FAR; BAND], code: [NOTHING; BAND] };
+    for (k, row) in rows.iter().enumerate().filter(|(_, row)| row.plane < FAR) {
+        room.distance[k] = row.plane;
+        room.code[k] = if row.tan < 0.0 { code(0, Face::Top) } else { code(1, Face::Underside) };
+    }
+    let mut tile = Tile { distance: [[0.0; TILE]; BAND], code: [[0; TILE]; BAND], colour: [[VOID; TILE]; BAND] };
+    for first in (0..width).step_by(TILE) {
+        let columns = first..width.min(first + TILE);
+        for c in columns.clone() {
+            let mut column = room;
+            claim(band.frame, rows, band.hits.of(c), &mut column);
+            shade_sides(band, rows.len(), c, &column, &mut tile, c - first);
         }
-        let mut tile = Tile {
-            distance: [[0.0; TILE]; BAND],
-            instance: [[0; TILE]; BAND],
-            plane: [[NO_PLANE; TILE]; BAND],
-            colour: [[VOID; TILE]; BAND],
-        };
-        for first in (0..width).step_by(TILE) {
-            let columns = first..width.min(first + TILE);
-            for c in columns.clone() {
-                let mut column = room;
-                self.claim(c, &mut column);
-                self.shade_sides(c, &column, &mut tile, c - first);
-            }
-            self.shade_planes(columns.clone(), &mut tile);
-            self.write(columns, &tile);
+        shade_planes(band, rows, columns.clone(), &mut tile);
+        write(band, rows, columns, &tile);
+    }
+}
+
+/// Decides what each row of a column sees: of all faces that its ray meets, the nearest.
+#[inline(always)]
+fn claim(frame: &Frame, rows: &[Row], hits: &[Hit], column: &mut Column) {
+    let eye = frame.params.camera_height;
+    for hit in hits {
+        let side = code(hit.surface, Face::Side);
+        if hit.top >= FAR {
+            take(column, 0..rows.len(), |_| hit.near, side); // a wall
+            continue;
+        }
+        // Rows look lower and lower, so that each condition holds from some row on or up to some row.
+        let below_top = rows.partition_point(|r| eye + hit.near * r.tan > hit.top);
+        let below_bottom = rows.partition_point(|r| eye + hit.near * r.tan >= hit.bottom);
+        take(column, below_top..below_bottom, |_| hit.near, side);
+        if hit.top < eye {
+            let from = rows.partition_point(|r| eye + hit.far * r.tan >= hit.top);
+            let top = |r: usize| (hit.top - eye) * rows[r].inverse_tan;
+            take(column, from..below_top, top, code(hit.surface, Face::Top));
+        } else if hit.bottom > eye {
+            let to = rows.partition_point(|r| eye + hit.far * r.tan > hit.bottom);
+            let underside = |r: usize| (hit.bottom - eye) * rows[r].inverse_tan;
+            take(column, below_bottom..to, underside, code(hit.surface, Face::Underside));
         }
     }
+}
 
-    /// Decides what each row of column `c` sees: of all faces that its ray meets, the nearest.
-    fn claim(&self, c: usize, column: &mut Column) {
-        let rows = self.rows;
-        let eye = self.frame.params.camera_height;
-        for (k, hit) in (0..).zip(self.hits.of(c)) {
-            let side = owner(k, Face::Side);
-            if hit.top >= FAR {
-                take(column, 0..rows.len(), hit.near, side); // a wall
-                continue;
-            }
-            // Rows look lower and lower, so that each condition holds from some row on or up to some row.
-            let below_top = rows.partition_point(|r| eye + hit.near * r.tan > hit.top);
-            let below_bottom = rows.partition_point(|r| eye + hit.near * r.tan >= hit.bottom);
-            take(column, below_top..below_bottom, hit.near, side);
-            if hit.top < eye {
-                let from = rows.partition_point(|r| eye + hit.far * r.tan >= hit.top);
-                self.take_plane(column, from..below_top, hit.top - eye, owner(k, Face::Top));
-            } else if hit.bottom > eye {
-                let to = rows.partition_point(|r| eye + hit.far * r.tan > hit.bottom);
-                self.take_plane(column, below_bottom..to, hit.bottom - eye, owner(k, Face::Underside));
-            }
-        }
+/// Rows that see nothing nearer than `distance` show the face `code`.
+#[inline(always)]
+fn take(column: &mut Column, rows: Range<usize>, distance: impl Fn(usize) -> f32, code: u32) {
+    if rows.start >= rows.end {
+        return;
     }
+    let places = column.distance[rows.clone()].iter_mut().zip(&mut column.code[rows.clone()]);
+    for (r, (d, c)) in rows.zip(places) {
+        let t = distance(r);
+        let nearer = t < *d;
+        *d = if nearer { t } else { *d };
+        *c = if nearer { code } else { *c };
+    }
+}
 
-    fn take_plane(&self, column: &mut Column, rows: Range<usize>, above_eye: f32, owner: u32) {
-        for r in rows {
-            let t = above_eye * self.rows[r].inverse_tan;
-            if t < column.distance[r] {
-                column.distance[r] = t;
-                column.owner[r] = owner;
+/// Stores a column in its tile and shades its runs of rows that show the same side. Horizontal surfaces come later.
+#[inline(always)]
+fn shade_sides(band: &Band<'_>, rows: usize, c: usize, column: &Column, tile: &mut Tile, lane: usize) {
+    let codes = &column.code[..rows];
+    for r in 0..rows.min(BAND) {
+        tile.distance[r][lane % TILE] = column.distance[r];
+        tile.code[r][lane % TILE] = column.code[r];
+    }
+    let hits = band.hits.of(c);
+    let direction = band.frame.directions[c];
+    let mut colours = [VOID; RUN];
+    let mut start = 0;
+    while start < rows {
+        let one = codes[start];
+        let end = start + codes[start..].iter().position(|o| *o != one).unwrap_or(rows - start);
+        if !is_level(one) {
+            match hits.iter().find(|h| h.surface == one >> 2) {
+                Some(hit) => {
+                    let row = band.first_row + start;
+                    shade_side(band.scene, band.frame, hit, direction, row, end - start, &mut colours);
+                }
+                None => colours = [VOID; RUN],
+            }
+            for (places, colour) in tile.colour[start..end].iter_mut().zip(&colours) {
+                places[lane % TILE] = *colour;
             }
         }
+        start = end;
     }
+}
 
-    /// Stores a column in its tile and shades its runs of rows that show the same side. Horizontal surfaces come later.
-    fn shade_sides(&self, c: usize, column: &Column, tile: &mut Tile, lane: usize) {
-        let hits = self.hits.of(c);
-        let direction = self.frame.directions[c];
-        let count = self.rows.len();
-        for (distances, distance) in tile.distance[..count].iter_mut().zip(&column.distance) {
-            distances[lane] = *distance;
-        }
-        let owners = &column.owner[..count];
-        let mut colours = [VOID; RUN];
+/// Shades the runs of columns that show the same horizontal surface, row by row.
+#[inline(always)]
+fn shade_planes(band: &Band<'_>, rows: &[Row], columns: Range<usize>, tile: &mut Tile) {
+    let count = columns.len();
+    let mut directions = [[0.0; TILE]; 2];
+    for (k, direction) in band.frame.directions[columns].iter().enumerate() {
+        (directions[0][k], directions[1][k]) = (direction[0], direction[1]);
+    }
+    // Rows below one another mostly show the same surface.
+    let mut plane = (NOTHING, Plane::new(band.scene, band.frame, 0, false));
+    for ((row, codes), (distances, colours)) in rows.iter().zip(&tile.code).zip(tile.distance.iter().zip(&mut tile.colour)) {
         let mut start = 0;
         while start < count {
-            let one = owners[start];
-            let end = start + owners[start..].iter().position(|o| *o != one).unwrap_or(count - start);
-            let run = start..end;
-            let (surface, plane) = match one {
-                NOTHING => (None, NO_PLANE),
-                _ if one >= ROOM => {
-                    let surface = u32::from(one == ROOM + owner(0, Face::Underside));
-                    (Some(surface), 3 * surface)
+            let one = codes[start];
+            let end = start + codes[start..count].iter().position(|c| *c != one).unwrap_or(count - start);
+            if is_level(one) {
+                if plane.0 != one {
+                    plane = (one, Plane::new(band.scene, band.frame, one >> 2, one == code(one >> 2, Face::Underside)));
                 }
-                _ => {
-                    let surface = hits[one as usize / 4].surface;
-                    let face = one % 4;
-                    let plane = if face == Face::Side as u32 {
-                        NO_PLANE
-                    } else {
-                        2 * surface + u32::from(face == Face::Underside as u32)
-                    };
-                    (Some(surface), plane)
-                }
-            };
-            if plane == NO_PLANE {
-                match surface {
-                    Some(_) => {
-                        let hit: &Hit = &hits[one as usize / 4];
-                        shade_side(self.scene, self.frame, hit, direction, &self.rows[run.clone()], &mut colours);
-                    }
-                    None => colours[..run.len()].fill(VOID),
-                }
-                for (places, colour) in tile.colour[run.clone()].iter_mut().zip(&colours) {
-                    places[lane] = *colour;
-                }
-            }
-            let instance = surface.map_or(0, |s| s as u16 + 1);
-            for (instances, planes) in tile.instance[run.clone()].iter_mut().zip(&mut tile.plane[run]) {
-                instances[lane] = instance;
-                planes[lane] = plane;
+                let t = distances[start];
+                let shaded = plane.1.shade(band.scene, band.frame, &directions, t, row.inverse_tan, start..end);
+                colours[start..end].copy_from_slice(&shaded[start..end]);
             }
             start = end;
         }
     }
-
-    /// Shades the runs of columns that show the same horizontal surface, row by row.
-    fn shade_planes(&self, columns: Range<usize>, tile: &mut Tile) {
-        let count = columns.len();
-        let mut directions = [[0.0; TILE]; 2];
-        for (k, direction) in self.frame.directions[columns].iter().enumerate() {
-            (directions[0][k], directions[1][k]) = (direction[0], direction[1]);
-        }
-        for (r, row) in self.rows.iter().enumerate() {
-            let planes = &tile.plane[r][..count];
-            let mut start = 0;
-            while start < count {
-                let one = planes[start];
-                let end = start + planes[start..].iter().position(|p| *p != one).unwrap_or(count - start);
-                if one != NO_PLANE {
-                    let plane = Plane::new(self.scene, self.frame, one / 2, one % 2 == 1);
-                    let distance = tile.distance[r][start];
-                    let colours = plane.shade(self.scene, self.frame, &directions, distance, row.inverse_tan, start..end);
-                    tile.colour[r][start..end].copy_from_slice(&colours[start..end]);
-                }
-                start = end;
-            }
-        }
-    }
-
-    fn write(&mut self, columns: Range<usize>, tile: &Tile) {
-        let width = self.frame.params.width as usize;
-        let count = columns.len();
-        for (r, row) in self.rows.iter().enumerate() {
-            let at = r * width + columns.start;
-            let pixels = at..at + count;
-            let colours: &[u8] = bytemuck::cast_slice(&tile.colour[r]);
-            self.rgba[4 * pixels.start..4 * pixels.end].copy_from_slice(&colours[..4 * count]);
-            self.instance[pixels.clone()].copy_from_slice(&tile.instance[r][..count]);
-            for (range, distance) in self.range[pixels].iter_mut().zip(&tile.distance[r]) {
-                *range = if *distance < FAR { distance * row.stretch } else { 0.0 };
-            }
-        }
-    }
 }
 
-/// Rows that see nothing nearer than `distance` go to `owner`.
-fn take(column: &mut Column, rows: Range<usize>, distance: f32, owner: u32) {
-    if rows.start >= rows.end {
-        return;
-    }
-    for (d, o) in column.distance[rows.clone()].iter_mut().zip(&mut column.owner[rows]) {
-        let nearer = distance < *d;
-        *d = if nearer { distance } else { *d };
-        *o = if nearer { owner } else { *o };
+/// Copies a tile into the picture.
+#[inline(always)]
+fn write(band: &mut Band<'_>, rows: &[Row], columns: Range<usize>, tile: &Tile) {
+    let width = band.frame.params.width as usize;
+    let count = columns.len();
+    for (r, row) in rows.iter().enumerate() {
+        let range = tile.distance[r].map(|d| if d < FAR { d * row.stretch } else { 0.0 });
+        let instances = tile.code[r].map(instance);
+        let colours: &[u8; 4 * TILE] = bytemuck::cast_ref(&tile.colour[r]);
+        let at = r * width + columns.start;
+        let rgba = &mut band.rgba[4 * at..4 * (at + count)];
+        let ranges = &mut band.range[at..at + count];
+        let places = &mut band.instance[at..at + count];
+        if count == TILE {
+            // The lengths are known here, so that these are moves and no calls.
+            rgba.copy_from_slice(colours);
+            ranges.copy_from_slice(&range);
+            places.copy_from_slice(&instances);
+        } else {
+            rgba.copy_from_slice(&colours[..4 * count]);
+            ranges.copy_from_slice(&range[..count]);
+            places.copy_from_slice(&instances[..count]);
+        }
     }
 }
