@@ -152,9 +152,14 @@ impl RapierPlant {
             Event::Break(wheel, WheelFault::SeizedMotor) => self.seized[wheel] = true,
             Event::Break(wheel, WheelFault::DeadEncoder) => self.encoders.kill(wheel),
             Event::Break(wheel, WheelFault::WornTyre { friction_factor, radius_factor }) => {
-                self.chassis.wear_tyre(wheel, friction_factor, radius_factor);
+                self.wear_tyre(wheel, friction_factor, radius_factor);
             }
         }
+    }
+
+    /// Changes the tyre of wheel `k` (0 left, 1 right); see [`Chassis::wear_tyre`].
+    pub fn wear_tyre(&mut self, k: usize, friction_factor: f64, radius_factor: f64) {
+        self.chassis.wear_tyre(k, friction_factor, radius_factor);
     }
 
     /// Adds to the robot's velocity at once, as a push from outside does. The wheels learn of it through the floor.

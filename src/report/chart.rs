@@ -243,14 +243,14 @@ impl Chart {
                 }
                 _ => continue,
             };
-            for part in wrapped(label, 21) {
+            for part in wrapped(label, 19) {
                 group = group.add(text(&part, LEGEND_PX + 32.0, at + 4.0, 12.0));
                 at += 16.0;
             }
             at += 6.0;
         }
         at += 8.0;
-        for part in self.notes.iter().flat_map(|note| wrapped(note, 26)) {
+        for part in self.notes.iter().flat_map(|note| wrapped(note, 24)) {
             group = group.add(text(&part, LEGEND_PX, at + 4.0, 12.0).set("fill", FAINT_INK));
             at += 16.0;
         }

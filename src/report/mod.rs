@@ -9,6 +9,7 @@ mod folder;
 pub mod image;
 pub mod map;
 mod path_plot;
+pub mod physics;
 pub mod run;
 pub mod seeds;
 pub mod text;
