@@ -26,21 +26,23 @@ import mujoco
 ROBOT = dict(mass=2.3, radius=0.164, cog=0.03, track=0.233, wheel=0.036, wheel_inertia=1e-4, caster=0.125, caster_friction=0.05,
              stall=0.6, no_load=16.0, kp=0.4, ki=4.0, acceleration=0.9)
 STEP = 2.5e-4   # of MuJoCo, s: a quarter of wayhome's
-SAMPLE = 0.05   # s
+SAMPLE = 0.1    # s
+
+CREEPS = [0.01, 0.0005]  # of wayhome, m/s: the default, and wheels that hardly creep
 
 # name: (friction, rows of t, v, omega; the last row is the end)
 DRIVES = {
-    "straight, dry": (0.75, [(0, 0.3, 0), (5, 0, 0), (6, 0, 0)]),
-    "circle, dry": (0.75, [(0, 0.25, 1.0), (7, 0, 0), (8, 0, 0)]),
-    "slalom, dry": (0.75, [(0, 0.28, 0.8), (2, 0.28, -0.8), (6, 0.28, 0.8), (8, 0, 0), (9, 0, 0)]),
-    "turns on the spot, dry": (0.75, [(0, 0, 1.9), (3, 0, -1.2), (6, 0.2, 0), (8, 0, 0), (9, 0, 0)]),
-    "start and stop, ice": (0.04, [(0, 0.3, 0), (3, 0, 0), (5, -0.3, 0), (7, 0, 0), (9, 0, 0)]),
-    "curve, ice": (0.04, [(0, 0.3, 0), (2, 0.3, 1.5), (5, 0.3, -1.5), (8, 0, 0), (10, 0, 0)]),
+    "straight (dry)": (0.75, [(0, 0.3, 0), (5, 0, 0), (6, 0, 0)]),
+    "circle (dry)": (0.75, [(0, 0.25, 1.0), (7, 0, 0), (8, 0, 0)]),
+    "slalom (dry)": (0.75, [(0, 0.28, 0.8), (2, 0.28, -0.8), (6, 0.28, 0.8), (8, 0, 0), (9, 0, 0)]),
+    "turns on the spot (dry)": (0.75, [(0, 0, 1.9), (3, 0, -1.2), (6, 0.2, 0), (8, 0, 0), (9, 0, 0)]),
+    "start and stop (ice)": (0.04, [(0, 0.3, 0), (3, 0, 0), (5, -0.3, 0), (7, 0, 0), (9, 0, 0)]),
+    "curve (ice)": (0.04, [(0, 0.3, 0), (2, 0.3, 1.5), (5, 0.3, -1.5), (8, 0, 0), (10, 0, 0)]),
 }
 
 
-def wayhome(binary, friction, rows, folder):
-    """Rows of (t, x, y, heading) as `wayhome drive` writes them."""
+def wayhome(binary, friction, creep, rows, folder):
+    """Rows of (t, x, y, heading) as `wayhome drive` writes them; creep in m/s."""
     world = folder / "world.toml"
     world.write_text(
         f"""name = "outside"
@@ -51,6 +53,7 @@ task = {{ control_period_s = {SAMPLE} }}
 [robot]
 wheel_radius_error = [0.0, 0.0]
 rolling_resistance = 0.0
+creep_m_s = {creep}
 """)
     table = folder / "commands.csv"
     table.write_text("t_s,v_m_s,omega_rad_s\n" + "".join(f"{t},{v},{w}\n" for t, v, w in rows))
@@ -131,18 +134,20 @@ def main():
     parser.add_argument("--out", default="results/physics/mujoco.csv")
     args = parser.parse_args()
     binary = pathlib.Path(args.wayhome).resolve()
-    lines = ["drive,t_s,x_m,y_m,heading_rad,x_mujoco_m,y_mujoco_m,heading_mujoco_rad"]
+    lines = ["drive,t_s,x_m,y_m,heading_rad,x_stiff_m,y_stiff_m,heading_stiff_rad,x_mujoco_m,y_mujoco_m,heading_mujoco_rad"]
     for name, (friction, rows) in DRIVES.items():
-        with tempfile.TemporaryDirectory() as folder:
-            ours = wayhome(binary, friction, rows, pathlib.Path(folder))
+        ours = {}
+        for creep in CREEPS:
+            with tempfile.TemporaryDirectory() as folder:
+                ours[creep] = wayhome(binary, friction, creep, rows, pathlib.Path(folder))
         theirs = mujoco_drive(friction, rows)
-        assert len(ours) == len(theirs) and all(abs(a[0] - b[0]) < 1e-9 for a, b in zip(ours, theirs)), name
-        for a, b in zip(ours, theirs):
-            lines.append(",".join([name.replace(",", ""), *(f"{value:.6f}" for value in (*a, *b[1:]))]))
-        end = math.hypot(ours[-1][1] - theirs[-1][1], ours[-1][2] - theirs[-1][2])
-        most = max(math.hypot(a[1] - b[1], a[2] - b[2]) for a, b in zip(ours, theirs))
-        turn = math.degrees(math.remainder(theirs[-1][3] - ours[-1][3], 2 * math.pi))
-        print(f"{name:24} end {1e3 * end:7.2f} mm, most {1e3 * most:7.2f} mm, heading {turn:7.3f} deg")
+        for creep, path in ours.items():
+            assert len(path) == len(theirs) and all(abs(a[0] - b[0]) < 1e-9 for a, b in zip(path, theirs)), name
+            apart = [math.hypot(a[1] - b[1], a[2] - b[2]) for a, b in zip(path, theirs)]
+            turn = math.degrees(math.remainder(theirs[-1][3] - path[-1][3], 2 * math.pi))
+            print(f"{name:23} creep {creep:7} m/s: end {1e3 * apart[-1]:6.2f} mm, most {1e3 * max(apart):6.2f} mm, {turn:7.3f} deg")
+        for a, b, c in zip(ours[CREEPS[0]], ours[CREEPS[1]], theirs):
+            lines.append(",".join([name, *(f"{value:.6f}" for value in (*a, *b[1:], *c[1:]))]))
     pathlib.Path(args.out).write_text("\n".join(lines) + "\n")
 
 
