@@ -12,7 +12,7 @@ pub type Result<T> = std::result::Result<T, Error>;
 #[non_exhaustive]
 pub enum Error {
     /// A file or folder could not be read or written.
-    #[error("cannot {action} {}: {source}", path.display())]
+    #[error("cannot {action} {}", path.display())]
     Io {
         /// What was tried: "read", "write", "remove", "create folder".
         action: &'static str,
@@ -64,7 +64,7 @@ pub enum Error {
     #[error("graphics device failed: {0}")]
     Gpu(String),
     /// An image could not be encoded or decoded.
-    #[error("image {}: {source}", path.display())]
+    #[error("image {}", path.display())]
     Image {
         /// The file.
         path: PathBuf,

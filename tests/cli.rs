@@ -123,6 +123,27 @@ fn no_adapter_is_no_panic() {
     }
 }
 
+#[cfg(unix)]
+#[test]
+fn ctrl_c_ends_in_good_order() {
+    let folder = tempfile::tempdir().unwrap();
+    let arguments = ["home", LAB, "--bearings", "noisy", "--seeds", "1..90000", "--out", "batch"];
+    let mut child = wayhome(folder.path(), &arguments).stderr(std::process::Stdio::piped()).spawn().unwrap();
+    // The folder is opened once the handler is in place.
+    let marker = folder.path().join("batch/.wayhome");
+    let deadline = std::time::Instant::now() + std::time::Duration::from_secs(20);
+    while !marker.exists() {
+        assert!(std::time::Instant::now() < deadline, "the batch does not start");
+        std::thread::sleep(std::time::Duration::from_millis(10));
+    }
+    let killed = Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+    assert!(killed.success());
+    let status = child.wait().unwrap();
+    assert_eq!(status.code(), Some(130));
+    let held: Vec<_> = std::fs::read_dir(folder.path().join("batch")).unwrap().map(|e| e.unwrap().file_name()).collect();
+    assert_eq!(held, [".wayhome"], "nothing half done is left");
+}
+
 /// The summary of a finished run without what may differ from run to run.
 fn summary(folder: &Path) -> Value {
     let text = std::fs::read_to_string(folder.join("summary.json")).unwrap();

@@ -1,15 +1,16 @@
 //! The estimators against closed forms, automatic differentiation and a simulation of their own (perfect unicycle, noisy
 //! odometry and bearings, no renderer, no physics).
 
+#![allow(clippy::print_stdout, clippy::unwrap_used, reason = "a failing test shows its table, and fails by panicking")]
+
 use num_dual::{Dual64, DualNum};
-use rand_distr::{Distribution, Normal};
 use wayhome::episode::method::{LawKind, MethodKind, build};
 use wayhome::estimation::paper;
 use wayhome::geometry::{Pose, Twist, Vector2, angle_of, wrap};
 use wayhome::observation::{
     Bearing, Briefing, Estimate, HomeSnapshot, LandmarkId, Observation, Odometry, RobotSheet, Status, TaskSheet,
 };
-use wayhome::random::Seed;
+use wayhome::random::{Seed, standard_normal};
 
 /// (6) as the paper prints it, with R_i* by (3), in dual numbers.
 fn printed_dynamics(x: &[Dual64; 6], v: f64, omega: f64, home: &[f64; 3]) -> [Dual64; 6] {
@@ -87,12 +88,11 @@ fn trial(setting: &Setting, seed: u64) -> Trial {
     let mut truth = Pose::new(place.x, place.y, uniform(&mut start) * 6.3);
     let distance = place.norm();
     let mut noise = seed.stream("noise");
-    let normal = Normal::new(0.0, 1.0).unwrap();
     let sd = setting.bearing_sd_rad;
     let see = |pose: &Pose, noise: &mut wayhome::random::Stream| -> Vec<Bearing> {
         let mut seen = Vec::new();
         for (k, l) in setting.landmarks.iter().enumerate() {
-            let azimuth = angle_of(pose.inverse_transform(*l)) + sd * normal.sample(noise);
+            let azimuth = angle_of(pose.inverse_transform(*l)) + sd * standard_normal(noise);
             let wrong = uniform(noise) < setting.false_share;
             let azimuth = if wrong { uniform(noise) * 6.3 } else { azimuth };
             seen.push(Bearing { id: LandmarkId(k as u32), azimuth_rad: wrap(azimuth), sd_rad: sd });
@@ -106,7 +106,7 @@ fn trial(setting: &Setting, seed: u64) -> Trial {
             .enumerate()
             .map(|(k, l)| Bearing {
                 id: LandmarkId(k as u32),
-                azimuth_rad: wrap(angle_of(*l) + sd * normal.sample(&mut noise)),
+                azimuth_rad: wrap(angle_of(*l) + sd * standard_normal(&mut noise)),
                 sd_rad: sd,
             })
             .collect(),
@@ -139,8 +139,8 @@ fn trial(setting: &Setting, seed: u64) -> Trial {
         let share = setting.odometry_sd_share;
         odometry = Odometry {
             twist: Twist {
-                v: command.v * (1.0 + share * normal.sample(&mut noise)),
-                omega: command.omega * (1.0 + share * normal.sample(&mut noise)),
+                v: command.v * (1.0 + share * standard_normal(&mut noise)),
+                omega: command.omega * (1.0 + share * standard_normal(&mut noise)),
             },
             dt_s: period,
         };

@@ -1,5 +1,7 @@
 //! The renderer against closed forms and parry2d's ray cast, and properties that every picture has.
 
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
 use std::path::PathBuf;
 
 use parry2d::math::{Pose as ParryPose, Vector};
@@ -30,6 +32,7 @@ name = "stack"
 room = { outline_m = [[-3, -3], [3, -3], [3, 3], [-3, 3]], height_m = 2.5, walls = [{ family = "posters" }] }
 home = { x_m = 0, y_m = 0 }
 camera = { height_m = 0.8, horizon = 0.5 }
+robot = { height_m = 0.6 }
 landmarks = [
   { name = "table", position_m = [1.5, 0], height_m = 0.5, shape = { box = { size_m = [1, 1] } }, texture = { family = "planks" } },
   { name = "box", position_m = [1.75, 0], elevation_m = 0.5, height_m = 0.2, shape = { box = { size_m = [0.3, 1] } }, texture = { family = "tiles" } },

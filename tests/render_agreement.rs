@@ -3,6 +3,8 @@
 //! Where there is no adapter this says loudly that it did not run, and fails if `WAYHOME_REQUIRE_GPU` is 1. A comparison that
 //! fails leaves both pictures and their difference in the folder for temporary files, and says where.
 
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, OnceLock};
 
@@ -29,11 +31,15 @@ name = "cellar"
 seed = 7
 home = { x_m = 11, y_m = 21 }
 camera = { height_m = 0.55 }
+robot = { height_m = 0.5 }
 
 [room]
 outline_m = [[10, 20], [16, 20], [16, 22.5], [13.5, 22.5], [13.5, 25], [10, 25]]
 height_m = 2.2
-walls = [{ family = "brick" }, { family = "noise", period_m = 1.5 }, { family = "tiles" }]
+walls = [
+  { family = "brick" }, { family = "noise", period_m = 1.5 }, { family = "tiles" },
+  { family = "brick" }, { family = "noise", period_m = 1.5 }, { family = "tiles" },
+]
 floor = { family = "tiles", colour = [120, 120, 130] }
 ceiling = { family = "planks" }
 
@@ -64,7 +70,7 @@ texture = { family = "planks" }
 
 [[obstacles]]
 name = "wedge"
-shape = { polygon = { corners_m = [[0, 0], [0.7, 0.1], [0.5, 0.6], [0.1, 0.5]] } }
+shape = { polygon = { corners_m = [[-0.3, -0.3], [0.4, -0.2], [0.2, 0.3], [-0.2, 0.2]] } }
 position_m = [11, 22]
 height_m = 0.25
 texture = { family = "noise" }

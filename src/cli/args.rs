@@ -18,6 +18,8 @@ const EXIT_CODES: &str = "Exit codes:
   3    a single run of `home` ended without reaching home
   130  interrupted by Ctrl-C; nothing half written is left behind";
 
+/// Heading of the flags that all subcommands have.
+const GENERAL: &str = "General options";
 /// Shown under `drive --help`.
 const DRIVE_HELP: &str = "Commands are CSV with a header, times from 0 on:
   t_s,v_m_s,omega_rad_s
@@ -46,13 +48,13 @@ pub struct Args {
 #[derive(Debug, clap::Args)]
 pub struct CommonArgs {
     /// Print one JSON object on stdout
-    #[arg(long, global = true)]
+    #[arg(long, global = true, help_heading = GENERAL)]
     pub json: bool,
     /// No progress and no diagnostics on stderr, errors excepted
-    #[arg(long, short, global = true)]
+    #[arg(long, short, global = true, help_heading = GENERAL)]
     pub quiet: bool,
     /// Worker threads [default: one a processor]; no result depends on their number
-    #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    #[arg(long, global = true, help_heading = GENERAL, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub threads: Option<u16>,
 }
 
@@ -236,6 +238,11 @@ fn choice<T: Copy + Send + Sync + 'static>(choices: &'static [Choice<T>]) -> imp
     let names = choices.iter().map(|(_, name, help)| PossibleValue::new(*name).help(*help));
     PossibleValuesParser::new(names)
         .try_map(|given| choices.iter().find(|(_, name, _)| *name == given).map(|(value, ..)| *value).ok_or("unknown name"))
+}
+
+/// What `--bearings` calls a sensor.
+pub fn bearings_name(bearings: Bearings) -> &'static str {
+    BEARINGS.iter().find(|(value, ..)| *value == bearings).map_or("", |(_, name, _)| name)
 }
 
 /// A finite number.

@@ -13,7 +13,7 @@ use wayhome::study::seeds::{SeedEvent, SeedsSummary, run_seeds};
 use wayhome::world::World;
 
 use super::Verdict;
-use super::args::HomeArgs;
+use super::args::{self, HomeArgs};
 use super::context::{Context, default_folder};
 
 /// What `--json` prints for one run: its summary and where the files are.
@@ -89,12 +89,9 @@ fn batch(args: &HomeArgs, context: &Context, world: &World, setup: &Setup, seeds
 
 /// The setup that the arguments ask for.
 fn setup(args: &HomeArgs) -> Result<Setup, Error> {
-    let only_with = |flag: &str, found: bool, needed: &str| {
-        if found { Err(Error::Invalid { what: flag.into(), found: "it".into(), allowed: needed.into() }) } else { Ok(()) }
-    };
     let noisy = args.noise_deg.is_some() || args.noise_dropout.is_some() || args.noise_false.is_some();
-    only_with("--noise-*", noisy && args.bearings != Bearings::Noisy, "it only with --bearings noisy")?;
-    only_with("--size", args.size.is_some() && args.bearings != Bearings::Rendered, "it only with --bearings rendered")?;
+    needs_bearings(noisy, "--noise-*", args.bearings, Bearings::Noisy)?;
+    needs_bearings(args.size.is_some(), "--size", args.bearings, Bearings::Rendered)?;
     let usual = Noise::default();
     Ok(Setup {
         plant: args.plant,
@@ -112,4 +109,13 @@ fn setup(args: &HomeArgs) -> Result<Setup, Error> {
         initial_estimate: args.initial_estimate,
         time_limit_s: args.time_limit_s,
     })
+}
+
+/// Refuses a flag that would do nothing with the sensor that was chosen.
+fn needs_bearings(given: bool, flag: &str, found: Bearings, needed: Bearings) -> Result<(), Error> {
+    if !given || found == needed {
+        return Ok(());
+    }
+    let name = |bearings| format!("--bearings {}", args::bearings_name(bearings));
+    Err(Error::Invalid { what: format!("sensor for {flag}"), found: name(found), allowed: name(needed) })
 }

@@ -1,6 +1,6 @@
 //! Control laws: from the believed pose to wheel commands.
 //!
-//! A law steers; a governor sets the speed. Both see only an [`Estimate`]'s pose and the data sheets, never the simulator.
+//! A law steers; a governor sets the speed. Both see only an estimate's pose and the data sheets, never the simulator.
 
 use crate::geometry::{Pose, Twist, angle_of, wrap};
 use crate::observation::{RobotSheet, TaskSheet};
@@ -19,7 +19,7 @@ const STEERING_GAIN: f64 = 4.0;
 /// The paper's beta.
 const BETA: f64 = 1.5;
 /// Deceleration planned for the last stretch, as a share of the drive's own.
-const BRAKING_SHARE: f64 = 0.8;
+const BRAKING_SHARE: f64 = 0.9;
 
 /// A steering law with the limits of robot and task.
 #[derive(Debug, Clone, Copy)]
@@ -62,7 +62,10 @@ impl Controller {
         let range = pose.position().norm();
         let error = home_direction(pose);
         let cruise = self.task.speed_m_s.min(self.robot.max_speed_m_s);
-        let braking = (2.0 * BRAKING_SHARE * self.robot.max_acceleration_m_s2 * range).sqrt();
+        // The greatest speed that, held for one period more, can still be braked to rest at home: v T + v^2 / (2 a) = range.
+        let a = BRAKING_SHARE * self.robot.max_acceleration_m_s2;
+        let period = self.task.control_period_s;
+        let braking = a * ((period * period + 2.0 * range / a).sqrt() - period);
         let facing = libm::cos(error.clamp(-std::f64::consts::FRAC_PI_2, std::f64::consts::FRAC_PI_2));
         // The relay turns only while it moves: it needs a little speed even when it faces away.
         let least = if self.law == Law::Lyapunov { 0.1 } else { 0.0 };

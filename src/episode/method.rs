@@ -80,6 +80,9 @@ struct AnchoredHoming {
     filter: AnchoredFilter,
     controller: Controller,
     arrival_radius_m: f64,
+    max_acceleration_m_s2: f64,
+    /// Speed last commanded.
+    speed_m_s: f64,
     unsure_since_s: Option<f64>,
     arrived: bool,
 }
@@ -90,6 +93,8 @@ impl AnchoredHoming {
             filter: AnchoredFilter::new(settings, &briefing.home),
             controller,
             arrival_radius_m: briefing.task.arrival_radius_m,
+            max_acceleration_m_s2: briefing.robot.max_acceleration_m_s2,
+            speed_m_s: 0.0,
             unsure_since_s: None,
             arrived: false,
         }
@@ -98,7 +103,9 @@ impl AnchoredHoming {
     /// Command for a belief that home is adopted.
     fn approach(&mut self, estimate: &Estimate, time_s: f64) -> (Twist, bool) {
         let range = estimate.range_m();
-        let near = range <= STOP_SHARE * self.arrival_radius_m;
+        // Braking from the speed last commanded takes this far; it may begin before home is reached.
+        let rolling = self.speed_m_s * self.speed_m_s / (2.0 * self.max_acceleration_m_s2);
+        let near = range <= (STOP_SHARE * self.arrival_radius_m).max(rolling.min(0.5 * self.arrival_radius_m));
         let passing = range <= 0.8 * self.arrival_radius_m && estimate.home_direction_rad().abs() > 1.4;
         if !(near || passing) {
             return (self.controller.drive(&estimate.pose), false);
@@ -130,6 +137,7 @@ impl Method for AnchoredHoming {
             (None, Some(guess)) => self.search(&guess, observation.time_s),
             (None, None) => Twist { v: 0.0, omega: 0.6 },
         };
+        self.speed_m_s = command.v;
         let status = if self.arrived { Status::Arrived } else { Status::Running };
         let nis = if report.matched > 0 { report.nis / report.matched as f64 } else { f64::NAN };
         Decision { command, estimate, status, matched: report.matched, rejected: report.rejected, nis }

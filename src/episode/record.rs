@@ -76,7 +76,7 @@ pub struct Timing {
     pub vision_s: f64,
     /// The method: estimation and control.
     pub estimation_s: f64,
-    /// All of it.
+    /// The loop from its first observation to its end, with all of the above.
     pub wall_s: f64,
     /// Simulated time over wall-clock time.
     pub real_time_factor: f64,

@@ -225,3 +225,121 @@ fn is_stuck(steps: &[Step], period_s: f64) -> bool {
             && wrap(s.truth.heading - now.truth.heading).abs() < STUCK_TURN_RAD
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::observation::{Bearing, Decision, HomeSnapshot};
+    use crate::physics::PlantStep;
+
+    /// Moves as told along a line, short of a wall; coasts for one period after the command ends.
+    struct Track {
+        pose: Pose,
+        wall_x: f64,
+        last_v: f64,
+    }
+
+    impl Plant for Track {
+        fn step(&mut self, command: Twist, dt_s: f64) -> PlantStep {
+            let v = 0.5 * (command.v + self.last_v);
+            self.last_v = command.v;
+            self.pose.x = (self.pose.x + v * dt_s).min(self.wall_x);
+            PlantStep { odometry: Odometry { twist: Twist { v, omega: 0.0 }, dt_s }, ..PlantStep::default() }
+        }
+        fn truth(&self) -> Pose {
+            self.pose
+        }
+        fn body_poses(&self) -> &[Pose] {
+            &[]
+        }
+    }
+
+    struct Blind(HomeSnapshot);
+
+    impl Sensor for Blind {
+        fn home(&self) -> &HomeSnapshot {
+            &self.0
+        }
+        fn observe(&mut self, _: Pose, _: &[Pose]) -> Result<Vec<Bearing>> {
+            Ok(Vec::new())
+        }
+    }
+
+    /// Drives at 0.2 m/s until a time and then says something.
+    struct Script {
+        until_s: f64,
+        then: Status,
+        v: f64,
+    }
+
+    impl Method for Script {
+        fn step(&mut self, observation: &Observation<'_>) -> Decision {
+            let ended = observation.time_s >= self.until_s;
+            Decision {
+                command: Twist { v: self.v, omega: 0.0 },
+                estimate: None,
+                status: if ended { self.then } else { Status::Running },
+                matched: 0,
+                rejected: 0,
+                nis: f64::NAN,
+            }
+        }
+    }
+
+    /// Home lies 1 m ahead of the start.
+    fn episode(wall_x: f64, script: Script) -> Record {
+        let task = TaskSpec { time_limit_s: 20.0, ..TaskSpec::default() };
+        let mut plant = Track { pose: Pose::IDENTITY, wall_x, last_v: 0.0 };
+        let (mut sensor, mut method) = (Blind(HomeSnapshot::default()), script);
+        let parts = Parts { plant: &mut plant, sensor: &mut sensor, method: &mut method };
+        run(parts, Pose::new(1.0, 0.0, 0.0), &task, &mut |_| ControlFlow::Continue(())).unwrap()
+    }
+
+    fn script(until_s: f64, then: Status) -> Script {
+        Script { until_s, then, v: 0.2 }
+    }
+
+    #[test]
+    fn a_claim_counts_where_the_robot_rests() {
+        let right = episode(9.0, script(5.0, Status::Arrived));
+        assert_eq!((right.outcome, right.claimed_home, right.time_s), (Outcome::Home, true, 5.0));
+        // 0.2 m/s for 5 s, half of that in the first period, and half of that again in the period after the stop.
+        assert!(right.final_distance_m() < 1e-12, "{}", right.final_distance_m());
+        assert!(right.last().time_s > 5.0 && right.last().seen.is_none() && right.odometry_drift_m() < 1e-12);
+        let wrong = episode(9.0, script(4.0, Status::Arrived));
+        assert_eq!((wrong.outcome, wrong.claimed_home), (Outcome::Lost, true));
+        assert!((wrong.final_distance_m() - 0.2).abs() < 1e-12);
+    }
+
+    #[test]
+    fn other_ends_are_told_apart() {
+        let lost = episode(9.0, script(1.0, Status::Lost));
+        assert_eq!((lost.outcome, lost.claimed_home, lost.time_s), (Outcome::Lost, false, 1.0));
+        let late = episode(9.0, script(99.0, Status::Arrived));
+        assert_eq!((late.outcome, late.time_s), (Outcome::Timeout, 20.0));
+        let broken = episode(9.0, Script { until_s: 99.0, then: Status::Arrived, v: f64::NAN });
+        assert_eq!((broken.outcome, broken.time_s), (Outcome::Lost, 0.0));
+        assert!(broken.last().truth.is_finite());
+    }
+
+    #[test]
+    fn only_a_robot_that_is_told_to_move_gets_stuck() {
+        let stuck = episode(0.5, script(99.0, Status::Arrived));
+        assert_eq!(stuck.outcome, Outcome::Stuck);
+        // At the wall after 2.55 s; 5 s later, but for the last 2 cm, it has not moved.
+        assert!((stuck.time_s - 7.5).abs() < 0.2, "{}", stuck.time_s);
+        let waiting = episode(0.5, Script { until_s: 99.0, then: Status::Arrived, v: 0.0 });
+        assert_eq!(waiting.outcome, Outcome::Timeout);
+    }
+
+    #[test]
+    fn a_watcher_can_stop_it() {
+        let mut plant = Track { pose: Pose::IDENTITY, wall_x: 9.0, last_v: 0.0 };
+        let (mut sensor, mut method) = (Blind(HomeSnapshot::default()), script(99.0, Status::Arrived));
+        let parts = Parts { plant: &mut plant, sensor: &mut sensor, method: &mut method };
+        let stop_after_a_second =
+            &mut |p: &Progress| if p.time_s < 1.0 { ControlFlow::Continue(()) } else { ControlFlow::Break(()) };
+        let result = run(parts, Pose::new(1.0, 0.0, 0.0), &TaskSpec::default(), stop_after_a_second);
+        assert!(matches!(result, Err(Error::Interrupted)));
+    }
+}

@@ -218,12 +218,12 @@ impl GainFactor {
             .collect();
         let m = batch.len();
         let mut l: Vec<Vec<f64>> = Vec::with_capacity(m);
-        for i in 0..m {
+        for (i, measurement) in batch.iter().enumerate() {
             let mut row = vec![0.0; i + 1];
             for j in 0..=i {
-                let mut s = batch[i].row.dot(&p_ht[j]);
+                let mut s = measurement.row.dot(&p_ht[j]);
                 if i == j {
-                    s += batch[i].variance;
+                    s += measurement.variance;
                 }
                 let done: &[f64] = if i == j { &row[..j] } else { &l[j][..j] };
                 for (a, b) in row[..j].iter().zip(done) {
@@ -241,16 +241,15 @@ impl GainFactor {
             l.push(row);
         }
         let mut w = p_ht;
-        for j in 0..m {
+        for (j, row) in l.iter().enumerate() {
             let (done, rest) = w.split_at_mut(j);
             let column = &mut rest[0];
-            for (k, earlier) in done.iter().enumerate() {
-                let factor = l[j][k];
+            for (earlier, &factor) in done.iter().zip(row) {
                 for (c, e) in column.iter_mut().zip(earlier) {
                     *c -= factor * e;
                 }
             }
-            let scale = 1.0 / l[j][j];
+            let scale = 1.0 / row[j];
             column.iter_mut().for_each(|c| *c *= scale);
         }
         Some(Self { w, l })

@@ -26,6 +26,9 @@ const TILE: usize = 16;
 /// Colour where there is nothing.
 const VOID: u32 = 0xff00_0000;
 
+/// Number of a band, and its part of the colours, ranges and instance ids.
+type BandBuffers<'a> = (usize, ((&'a mut [u8], &'a mut [f32]), &'a mut [u16]));
+
 /// The CPU renderer.
 #[derive(Debug)]
 pub struct CpuRenderer {
@@ -62,7 +65,7 @@ impl Renderer for CpuRenderer {
         let (width, height) = (view.projection.width as usize, view.projection.height as usize);
         let rows = height.div_ceil(height.div_ceil(BAND));
         let size = rows * width;
-        let paint = |(k, ((rgba, range), instance)): (usize, ((&mut [u8], &mut [f32]), &mut [u16]))| {
+        let paint = |(k, ((rgba, range), instance)): BandBuffers<'_>| {
             Band { scene, frame, hits, rows: &frame.rows[k * rows..], rgba, range, instance }.paint();
         };
         // Inside a pool the caller already spreads pictures over the cores.

@@ -4,8 +4,9 @@
 //! (Lowe 2004, on the half-octave pyramid). The robot turns about the vertical only, so features have no orientation: up is
 //! up in every picture.
 
-use super::ExtractorSettings;
-use super::pyramid::{BASE_SIGMA, Image, Pyramid};
+use std::f32::consts::TAU;
+
+use super::pyramid::{BASE_SIGMA, Image, Pyramid, UNITS};
 
 /// A feature of a panorama.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -21,75 +22,106 @@ pub(super) struct Feature {
     pub level: usize,
     /// Strength of the difference-of-Gaussians, grey levels; negative for a bright blob.
     pub response: f32,
+    /// How loosely the blob fixes its own column: 1 for a round one, above for one that is stretched along the row.
+    pub looseness: f32,
 }
 
 /// Finds the features of a pyramid and keeps the strongest, spread over azimuth and scale, in an order that depends on the
-/// picture only.
-pub(super) fn detect(
-    pyramid: &Pyramid,
-    settings: &ExtractorSettings,
-    limit: usize,
-    scratch: &mut Scratch,
-    features: &mut Vec<Feature>,
-) {
+/// picture only. Returns the strength below which no feature had a chance to be kept.
+pub(super) fn detect(pyramid: &Pyramid, criteria: &Criteria, scratch: &mut Scratch, features: &mut Vec<Feature>) -> f32 {
     features.clear();
     let layers = 2 * pyramid.octaves.len();
     for layer in 0..layers - 1 {
-        scan(pyramid, layer, settings, scratch, features);
+        scan(pyramid, layer, criteria, scratch, features);
     }
     let width = pyramid.octaves[0].gauss[0].width as f32;
-    spread(features, width, settings.spread_rad as f32 / std::f32::consts::TAU * width, limit);
+    spread(features, width, criteria)
 }
 
-/// A layer's difference image and its size relative to the panorama.
-fn layer_of(pyramid: &Pyramid, layer: usize) -> (&Image, f32, f32) {
+/// A layer next to the one that is scanned, addressed in the pixels of that one.
+struct Neighbour<'a> {
+    image: &'a Image<i16>,
+    ratio_x: f32,
+    ratio_y: f32,
+}
+
+impl<'a> Neighbour<'a> {
+    fn new(pyramid: &'a Pyramid, layer: usize, scanned: usize) -> Self {
+        let (own, other) = (&pyramid.octaves[scanned / 2], &pyramid.octaves[layer / 2]);
+        Self { image: &other.difference[layer % 2], ratio_x: own.step_x / other.step_x, ratio_y: own.step_y / other.step_y }
+    }
+
+    /// Value in grey levels at (x, y) of the scanned layer.
+    fn sample(&self, x: f32, y: f32) -> f32 {
+        self.image.sample(x * self.ratio_x, y * self.ratio_y) * (1.0 / UNITS)
+    }
+
+    /// Whether `value`, at row `y` and the middle one of three columns, lies further from 0 than this layer at and beside
+    /// that place.
+    fn topped_by(&self, value: f32, [left, x, right]: [usize; 3], y: usize) -> bool {
+        let sign = value.signum();
+        let least = sign * value;
+        if self.ratio_x == 1.0 {
+            let at = |x: usize, y: usize| sign * f32::from(self.image.row(y)[x]) < UNITS * least;
+            return at(x, y) && at(left, y) && at(right, y) && at(x, y - 1) && at(x, y + 1);
+        }
+        let (x, y) = (x as f32, y as f32);
+        let cross = [(0.0, 0.0), (-1.0, 0.0), (1.0, 0.0), (0.0, -1.0), (0.0, 1.0)];
+        cross.iter().all(|(dx, dy)| sign * self.sample(x + dx, y + dy) < least)
+    }
+}
+
+/// What counts as a feature.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Criteria {
+    /// Least strength, grey levels.
+    pub contrast: f32,
+    /// Largest ratio of curvatures.
+    pub edge_ratio: f32,
+    /// Features are ranked among those within this azimuth on either side, rad.
+    pub spread_rad: f64,
+    /// Most features.
+    pub limit: usize,
+    /// Strongest features of the whole panorama that compete for those places; at least `limit`.
+    pub contenders: usize,
+}
+
+fn scan(pyramid: &Pyramid, layer: usize, criteria: &Criteria, scratch: &mut Scratch, features: &mut Vec<Feature>) {
     let octave = &pyramid.octaves[layer / 2];
-    (&octave.difference[layer % 2], octave.step_x, octave.step_y)
-}
-
-fn scan(pyramid: &Pyramid, layer: usize, settings: &ExtractorSettings, scratch: &mut Scratch, features: &mut Vec<Feature>) {
-    let (image, step_x, step_y) = layer_of(pyramid, layer);
+    let image = &octave.difference[layer % 2];
     let (width, height) = (image.width, image.height);
+    let coarser = Neighbour::new(pyramid, layer + 1, layer);
+    // The finest layer has none below it: what is smallest there may be smaller still, and is taken as it is.
+    let finer = (layer > 0).then(|| Neighbour::new(pyramid, layer - 1, layer));
     for y in 1..height - 1 {
         let rows = [image.row(y - 1), image.row(y), image.row(y + 1)];
-        scratch.find(rows, settings.contrast);
+        scratch.find(rows, criteria.contrast);
         for &x in &scratch.found {
             let (left, right) = (if x == 0 { width - 1 } else { x - 1 }, if x + 1 == width { 0 } else { x + 1 });
-            let patch = rows.map(|row| [row[left], row[x], row[right]]);
+            let patch = rows.map(|row| [row[left], row[x], row[right]].map(|v| f32::from(v) * (1.0 / UNITS)));
+            let Some((dx, dy, peak, looseness)) = refine(&patch, criteria.edge_ratio) else { continue };
             let value = patch[1][1];
-            let sign = value.signum();
-            let (xf, yf) = (x as f32, y as f32);
-            let other = |layer: usize, x: f32, y: f32| {
-                let (image, sx, sy) = layer_of(pyramid, layer);
-                sign * image.sample(x * step_x / sx, y * step_y / sy)
-            };
-            let tops = |layer: usize| {
-                [(0.0, 0.0), (-1.0, 0.0), (1.0, 0.0), (0.0, -1.0), (0.0, 1.0)]
-                    .iter()
-                    .all(|&(dx, dy)| other(layer, xf + dx, yf + dy) < sign * value)
-            };
-            // The finest layer has none below it: what is smallest there may be smaller still, and is taken as it is.
-            if !tops(layer + 1) || (layer > 0 && !tops(layer - 1)) {
+            let columns = [left, x, right];
+            if !coarser.topped_by(value, columns, y) || finer.as_ref().is_some_and(|f| !f.topped_by(value, columns, y)) {
                 continue;
             }
-            let Some((dx, dy, peak)) = refine(&patch, settings.edge_ratio) else { continue };
-            let (xr, yr) = (xf + dx, yf + dy);
-            let shift = if layer == 0 {
-                0.0
-            } else {
-                let (low, high) = (other(layer - 1, xr, yr), other(layer + 1, xr, yr));
-                let bend = low + high - 2.0 * sign * peak;
-                if bend < 0.0 { (0.5 * (low - high) / bend).clamp(-0.5, 0.5) } else { 0.0 }
-            };
+            let (xr, yr) = (x as f32 + dx, y as f32 + dy);
+            let shift = finer.as_ref().map_or(0.0, |finer| {
+                let (low, high) = (finer.sample(xr, yr), coarser.sample(xr, yr));
+                let bend = low + high - 2.0 * peak;
+                // The bend has the sign opposite to the peak's.
+                if bend * peak < 0.0 { (0.5 * (low - high) / bend).clamp(-0.5, 0.5) } else { 0.0 }
+            });
             // Mean of the two images' standard deviations: a layer's two Gaussians are sqrt 2 apart.
             let sigma = BASE_SIGMA * 1.189_207_1 * libm::exp2f(0.5 * (layer as f32 + shift));
             features.push(Feature {
-                x: xr.rem_euclid(width as f32) * step_x,
-                y: yr * step_y,
+                x: xr.rem_euclid(width as f32) * octave.step_x,
+                y: yr * octave.step_y,
                 sigma,
                 octave: layer / 2,
                 level: layer % 2,
                 response: peak,
+                looseness,
             });
         }
     }
@@ -98,29 +130,31 @@ fn scan(pyramid: &Pyramid, layer: usize, settings: &ExtractorSettings, scratch: 
 /// Buffers of the scan.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Scratch {
-    high: Vec<f32>,
-    low: Vec<f32>,
+    high: Vec<i16>,
+    low: Vec<i16>,
     mask: Vec<u8>,
     found: Vec<usize>,
 }
 
 impl Scratch {
-    /// Fills `found` with the columns whose value in the middle row is above `threshold` and above all eight neighbours, or
-    /// below both the negative threshold and all neighbours. Written as plain loops over whole rows, which vectorise; few
-    /// pixels are left for the costlier tests.
-    fn find(&mut self, rows: [&[f32]; 3], threshold: f32) {
+    /// Fills `found` with the columns whose value in the middle row is above `threshold` grey levels and above all eight
+    /// neighbours, or below both the negative threshold and all neighbours; of equal neighbours the left or upper one counts.
+    /// Written as plain loops over whole rows, which vectorise; few pixels are left for the costlier tests.
+    fn find(&mut self, rows: [&[i16]; 3], threshold: f32) {
         let [above, row, below] = rows;
         let width = row.len();
-        self.high.resize(width + 2, 0.0);
-        self.low.resize(width + 2, 0.0);
+        let threshold = (threshold * UNITS) as i16;
+        self.high.resize(width + 2, 0);
+        self.low.resize(width + 2, 0);
         // Buffers serve layers of all widths: what a wider one left behind the last column must not be found.
         self.mask.clear();
         self.mask.resize(width.next_multiple_of(8), 0);
+        self.mask[width..].fill(0);
         // Extremes of each column's three pixels, with a copy of the other end on either side.
         let columns = above.iter().zip(row).zip(below);
         for ((high, low), ((a, b), c)) in self.high[1..=width].iter_mut().zip(&mut self.low[1..=width]).zip(columns) {
-            *high = larger(larger(*a, *b), *c);
-            *low = smaller(smaller(*a, *b), *c);
+            *high = (*a).max(*b).max(*c);
+            *low = (*a).min(*b).min(*c);
         }
         (self.high[0], self.high[width + 1]) = (self.high[width], self.high[1]);
         (self.low[0], self.low[width + 1]) = (self.low[width], self.low[1]);
@@ -128,9 +162,9 @@ impl Scratch {
         let low = self.low[..width].iter().zip(&self.low[2..]);
         let columns = above.iter().zip(row).zip(below);
         for (((mask, (h0, h1)), (l0, l1)), ((a, b), c)) in self.mask.iter_mut().zip(high).zip(low).zip(columns) {
-            let top = larger(larger(larger(*h0, *h1), larger(*a, *c)), threshold);
-            let bottom = smaller(smaller(smaller(*l0, *l1), smaller(*a, *c)), -threshold);
-            *mask = u8::from(*b > top) | u8::from(*b < bottom);
+            let top = (*b > (*h0).max(*a).max(threshold)) & (*b >= (*h1).max(*c));
+            let bottom = (*b < (*l0).min(*a).min(-threshold)) & (*b <= (*l1).min(*c));
+            *mask = u8::from(top | bottom);
         }
         self.found.clear();
         for (k, eight) in self.mask.as_chunks::<8>().0.iter().enumerate() {
@@ -141,19 +175,10 @@ impl Scratch {
     }
 }
 
-/// The larger of two numbers; unlike `f32::max` one instruction, since NaN does not occur here.
-fn larger(a: f32, b: f32) -> f32 {
-    if a > b { a } else { b }
-}
-
-/// The smaller of two numbers.
-fn smaller(a: f32, b: f32) -> f32 {
-    if a < b { a } else { b }
-}
-
-/// Fits a quadric to a 3 x 3 patch. Returns the offset of its extremum and the value there, or `None` for an edge (the
+/// Fits a quadric to a 3 x 3 patch. Returns the offset of its extremum, the value there and its looseness (see
+/// [`Feature`]), or `None` for an edge (the
 /// ratio of its curvatures is above `edge_ratio`) and where the extremum lies outside of the pixel by far.
-fn refine(p: &[[f32; 3]; 3], edge_ratio: f32) -> Option<(f32, f32, f32)> {
+fn refine(p: &[[f32; 3]; 3], edge_ratio: f32) -> Option<(f32, f32, f32, f32)> {
     let gx = 0.5 * (p[1][2] - p[1][0]);
     let gy = 0.5 * (p[2][1] - p[0][1]);
     let xx = p[1][2] + p[1][0] - 2.0 * p[1][1];
@@ -170,18 +195,30 @@ fn refine(p: &[[f32; 3]; 3], edge_ratio: f32) -> Option<(f32, f32, f32)> {
         return None;
     }
     let (dx, dy) = (dx.clamp(-0.6, 0.6), dy.clamp(-0.6, 0.6));
-    Some((dx, dy, p[1][1] + 0.5 * (gx * dx + gy * dy)))
+    // Variance of the column, from the inverse of the curvature, over that of a round blob of the same mean curvature.
+    // Measured bearing errors grow with its power 3/4.
+    let variance = 0.5 * trace * yy / det;
+    let looseness = (variance * variance.sqrt()).sqrt();
+    Some((dx, dy, p[1][1] + 0.5 * (gx * dx + gy * dy), looseness))
 }
 
-/// Keeps `limit` features. Each is ranked by how many stronger ones of its octave lie within `reach` columns, and the best
-/// ranked stay: rich corners of the room do not crowd out the poor ones, and no sector border makes a turn of the robot
-/// change the choice.
-fn spread(features: &mut Vec<Feature>, width: f32, reach: f32, limit: usize) {
+/// Keeps the wanted number of features. The strongest of the panorama are ranked by how many stronger ones of their octave
+/// lie nearby in azimuth, and the best ranked stay: rich corners of the room do not crowd out the poor ones, and no sector
+/// border makes a turn of the robot change the choice. Returns the strength of the strongest that was not even ranked.
+fn spread(features: &mut Vec<Feature>, width: f32, criteria: &Criteria) -> f32 {
+    let Criteria { limit, contenders, .. } = *criteria;
+    let reach = criteria.spread_rad as f32 / TAU * width;
+    let mut least = 0.0;
     let by_strength = |a: &Feature, b: &Feature| b.response.abs().total_cmp(&a.response.abs());
     let by_place = |a: &Feature, b: &Feature| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)).then(a.sigma.total_cmp(&b.sigma));
+    if features.len() > contenders {
+        let order = |a: &Feature, b: &Feature| by_strength(a, b).then_with(|| by_place(a, b));
+        features.select_nth_unstable_by(contenders, order);
+        least = features[contenders].response.abs();
+        features.truncate(contenders);
+    }
     if features.len() > limit {
-        // The stable sort keeps the order of equals, which is that of the picture.
-        features.sort_by(|a, b| a.octave.cmp(&b.octave).then(a.x.total_cmp(&b.x)));
+        features.sort_by(|a, b| a.octave.cmp(&b.octave).then_with(|| by_place(a, b)));
         let mut ranked = Vec::with_capacity(features.len());
         let (mut places, mut strengths) = (Vec::new(), Vec::new());
         for class in features.chunk_by(|a, b| a.octave == b.octave) {
@@ -211,4 +248,5 @@ fn spread(features: &mut Vec<Feature>, width: f32, reach: f32, limit: usize) {
         features.extend(ranked.into_iter().map(|(_, feature)| feature));
     }
     features.sort_by(by_place);
+    least
 }

@@ -4,7 +4,7 @@
 //! the landmark's height over its size, wherever it is seen from. Only features that agree in this number are compared at
 //! all, which saves most of the work and many wrong matches.
 
-use super::describe::{DISTANCE_SCALE, Descriptor, distance};
+use super::describe::{Descriptor, UNRELATED, distance};
 use super::detect::Feature;
 
 /// Two features that may be the same landmark.
@@ -14,7 +14,7 @@ pub(super) struct Candidate {
     pub now: usize,
     /// Index of the home feature.
     pub home: usize,
-    /// Squared descriptor distance, 0 (equal) to 1 (nothing in common).
+    /// Descriptor distance, 0 (equal) to about 1 (unrelated).
     pub distance: f32,
 }
 
@@ -23,37 +23,57 @@ pub(super) struct Candidate {
 pub(super) struct Choice {
     /// The candidate.
     pub candidate: Candidate,
-    /// Its distance over that of the runner-up (both squared); small is distinct.
+    /// Its distance over that of the runner-up; small is distinct.
     pub ratio: f32,
 }
 
-/// Features of the home panorama, ready to be matched.
+/// The home features, ready to be compared: sorted by height over size.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Gallery {
-    /// Home features sorted by height over size, with their index.
-    order: Vec<(f32, usize)>,
-    /// Descriptors of feature k in `variants` horizontal stretches, the first of them 1, from k * variants on.
-    descriptors: Vec<Descriptor>,
+    entries: Vec<Entry>,
+    plain: Vec<Descriptor>,
+    /// Horizontally stretched descriptors, `variants` of each feature.
+    stretched: Vec<Descriptor>,
     variants: usize,
 }
 
-/// Height over size: rows above the horizon in units of the scale.
+#[derive(Debug, Clone, Copy)]
+struct Entry {
+    height_over_size: f32,
+    sigma: f32,
+    feature: usize,
+}
+
+/// Rows above the horizon in units of the scale.
 fn height_over_size(feature: &Feature, horizon: f32) -> f32 {
     (horizon - feature.y) / feature.sigma
 }
 
+/// Largest change of scale between two sightings of a landmark.
+const ZOOM: f32 = 4.5;
+
 impl Gallery {
-    pub fn new(features: &[Feature], descriptors: Vec<Descriptor>, variants: usize, horizon: f32) -> Self {
-        let mut order: Vec<_> = features.iter().enumerate().map(|(k, f)| (height_over_size(f, horizon), k)).collect();
-        order.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        Self { order, descriptors, variants }
+    /// Describes every feature once plain and once for each of `stretches` by `describe(feature, stretch)`. `horizon` is the row of
+    /// the horizon.
+    pub fn new(features: &[Feature], stretches: &[f32], horizon: f32, describe: impl Fn(&Feature, f32) -> Descriptor) -> Self {
+        let mut entries: Vec<_> = features
+            .iter()
+            .enumerate()
+            .map(|(k, f)| Entry { height_over_size: height_over_size(f, horizon), sigma: f.sigma, feature: k })
+            .collect();
+        entries.sort_by(|a, b| a.height_over_size.total_cmp(&b.height_over_size).then(a.feature.cmp(&b.feature)));
+        let plain = entries.iter().map(|e| describe(&features[e.feature], 1.0)).collect();
+        let mut stretched = Vec::with_capacity(entries.len() * stretches.len());
+        for entry in &entries {
+            stretched.extend(stretches.iter().map(|s| describe(&features[entry.feature], *s)));
+        }
+        Self { entries, plain, stretched, variants: stretches.len() }
     }
 
-    /// Compares all features that agree in height over size. Candidates come grouped by current feature; those with a distance
-    /// above `limit` are left out.
+    /// Compares the current features with those home features that agree in height over size to within `slack` (an absolute
+    /// and a relative part). Candidates come grouped by current feature; those with a distance above `limit` are left out.
     pub fn compare(
         &self,
-        home: &[Feature],
         now: &[Feature],
         descriptors: &[Descriptor],
         horizon: f32,
@@ -62,32 +82,48 @@ impl Gallery {
         candidates: &mut Vec<Candidate>,
     ) {
         candidates.clear();
-        let hopeless = (2.5 * limit * DISTANCE_SCALE) as u32;
-        let limit = (limit * DISTANCE_SCALE) as u32;
+        // Stretching brings what is related nearer, not what is unrelated.
+        let hopeless = (1.3 * limit * UNRELATED) as u32;
+        let limit = (limit * UNRELATED) as u32;
         for (n, (feature, descriptor)) in now.iter().zip(descriptors).enumerate() {
             let height = height_over_size(feature, horizon);
             let reach = slack.0 + slack.1 * height.abs();
-            let from = self.order.partition_point(|(h, _)| *h < height - reach);
-            for &(_, k) in self.order[from..].iter().take_while(|(h, _)| *h <= height + reach) {
-                let ratio = feature.sigma / home[k].sigma;
-                if !(0.22..4.5).contains(&ratio) {
+            let from = self.entries.partition_point(|e| e.height_over_size < height - reach);
+            let to = self.entries.partition_point(|e| e.height_over_size <= height + reach);
+            for (k, (entry, plain)) in self.entries[from..to].iter().zip(&self.plain[from..to]).enumerate() {
+                if feature.sigma > ZOOM * entry.sigma || entry.sigma > ZOOM * feature.sigma {
                     continue;
                 }
-                let variants = &self.descriptors[k * self.variants..(k + 1) * self.variants];
-                let Some((plain, stretched)) = variants.split_first() else { continue };
                 let mut best = distance(descriptor, plain);
-                // Stretching brings what is related nearer, not what is unrelated.
                 if best > hopeless {
                     continue;
                 }
-                for variant in stretched {
+                for variant in &self.stretched[(from + k) * self.variants..][..self.variants] {
                     best = best.min(distance(descriptor, variant));
                 }
                 if best <= limit {
-                    candidates.push(Candidate { now: n, home: k, distance: best as f32 / DISTANCE_SCALE });
+                    candidates.push(Candidate { now: n, home: entry.feature, distance: best as f32 / UNRELATED });
                 }
             }
         }
+    }
+}
+
+/// The features of one of the two panoramas.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct View<'a> {
+    pub features: &'a [Feature],
+    /// Columns of the panorama.
+    pub width: f32,
+}
+
+impl View<'_> {
+    /// Whether two features are the same blob, found twice.
+    fn same_place(&self, i: usize, j: usize) -> bool {
+        let (a, b) = (&self.features[i], &self.features[j]);
+        let near = a.sigma.min(b.sigma);
+        let apart = (a.x - b.x).abs();
+        apart.min(self.width - apart) < near && (a.y - b.y).abs() < near
     }
 }
 
@@ -96,58 +132,40 @@ impl Gallery {
 /// the most to the least distinct.
 pub(super) fn choose(
     candidates: &[Candidate],
-    home: &[Feature],
-    now: &[Feature],
+    home: View<'_>,
+    now: View<'_>,
     limit: f32,
     max_ratio: f32,
     allowed: impl Fn(&Candidate) -> bool,
 ) -> Vec<Choice> {
-    let mut best_of_home: Vec<Option<Candidate>> = vec![None; home.len()];
-    let mut rows = Vec::new();
+    let mut best_of_home: Vec<Option<Candidate>> = vec![None; home.features.len()];
+    let mut choices = Vec::new();
+    let mut passed = Vec::new();
     for group in candidates.chunk_by(|a, b| a.now == b.now) {
-        let mut best: Option<Candidate> = None;
-        let mut kept = Vec::new();
-        for candidate in group.iter().filter(|c| allowed(c)) {
-            kept.push(*candidate);
-            if best.is_none_or(|b| candidate.distance < b.distance) {
-                best = Some(*candidate);
-            }
+        passed.clear();
+        passed.extend(group.iter().copied().filter(|c| allowed(c)));
+        for candidate in &passed {
             let rival = &mut best_of_home[candidate.home];
             if rival.is_none_or(|r| candidate.distance < r.distance) {
                 *rival = Some(*candidate);
             }
         }
-        let Some(best) = best else { continue };
-        let second = kept
-            .iter()
-            .filter(|c| !same_place(&home[c.home], &home[best.home]))
-            .map(|c| c.distance)
-            .fold(f32::INFINITY, f32::min);
-        rows.push((best, second));
+        let Some(best) = passed.iter().copied().min_by(|a, b| a.distance.total_cmp(&b.distance)) else { continue };
+        let others = passed.iter().filter(|c| !home.same_place(c.home, best.home));
+        let second = others.map(|c| c.distance).fold(f32::INFINITY, f32::min);
+        let choice = Choice { candidate: best, ratio: best.distance / second.max(1e-6) };
+        if best.distance <= limit && choice.ratio <= max_ratio {
+            choices.push(choice);
+        }
     }
-    let mut choices: Vec<_> = rows
-        .into_iter()
-        .map(|(candidate, second)| Choice { candidate, ratio: candidate.distance / second.max(1e-6) })
-        .filter(|c| c.candidate.distance <= limit && c.ratio <= max_ratio)
-        .filter(|c| {
-            best_of_home[c.candidate.home]
-                .is_some_and(|r| r.now == c.candidate.now || same_place(&now[r.now], &now[c.candidate.now]))
-        })
-        .collect();
-    // Each home feature once, the nearest first.
-    choices.sort_by(|a, b| {
-        a.candidate
-            .home
-            .cmp(&b.candidate.home)
-            .then(a.candidate.distance.total_cmp(&b.candidate.distance))
-            .then(a.candidate.now.cmp(&b.candidate.now))
+    choices.retain(|c| {
+        let best = best_of_home[c.candidate.home];
+        best.is_some_and(|b| b.now == c.candidate.now || now.same_place(b.now, c.candidate.now))
     });
+    // Each home feature once, with its nearest.
+    let by_distance = |a: &Candidate, b: &Candidate| a.distance.total_cmp(&b.distance).then(a.now.cmp(&b.now));
+    choices.sort_by(|a, b| a.candidate.home.cmp(&b.candidate.home).then_with(|| by_distance(&a.candidate, &b.candidate)));
     choices.dedup_by_key(|c| c.candidate.home);
     choices.sort_by(|a, b| a.ratio.total_cmp(&b.ratio).then(a.candidate.home.cmp(&b.candidate.home)));
     choices
-}
-
-fn same_place(a: &Feature, b: &Feature) -> bool {
-    let near = 1.0 * a.sigma.min(b.sigma);
-    (a.x - b.x).abs() < near && (a.y - b.y).abs() < near
 }

@@ -73,7 +73,7 @@ impl Default for FilterSettings {
             sideways_noise_share: 0.01,
             gate: 10.8,
             max_landmarks: 60,
-            adopt_sd_share: 0.15,
+            adopt_sd_share: 0.06,
             adopt_sd_m: 0.04,
             adopt_margin: 5.0,
             patience_steps: 8,
@@ -335,7 +335,7 @@ impl AnchoredFilter {
         self.map = candidate;
         self.keep_poses(&solution);
         self.bad_steps = 0;
-        self.stage = Stage::Homing { next_rebuild: self.history.len() + 3, interval: 3 };
+        self.stage = Stage::Homing { next_rebuild: self.history.len() + 1, interval: 1 };
     }
 
     /// How well the robot's place must be known at this distance from home, m.

@@ -90,12 +90,12 @@ impl Stretch<'_> {
             let mut share = 1.0;
             let mut next = step.apply(&at, share);
             let mut next_cost = self.cost(&next);
-            while !(next_cost <= cost + 1e-9) && share > 0.02 {
+            while next_cost > cost + 1e-9 && share > 0.02 {
                 share *= 0.5;
                 next = step.apply(&at, share);
                 next_cost = self.cost(&next);
             }
-            if !(next_cost <= cost + 1e-9) {
+            if next_cost > cost + 1e-9 {
                 break;
             }
             let gained = cost - next_cost;
@@ -173,11 +173,10 @@ impl Stretch<'_> {
         let mut ll = vec![0.0; n * n];
         let mut l_right = vec![0.0; n];
         for (k, (prior, l)) in self.priors.iter().zip(&at.landmarks).enumerate() {
-            let d = [wrap(prior.mean[0] - l[0]), prior.mean[1] - l[1]];
-            for i in 0..2 {
-                let c = 2 * k + i;
-                ll[c * n + c] = 1.0 / prior.variance[i];
-                l_right[c] = d[i] / prior.variance[i];
+            let off = [wrap(prior.mean[0] - l[0]), prior.mean[1] - l[1]];
+            for (c, (off, variance)) in (2 * k..).zip(off.into_iter().zip(prior.variance)) {
+                ll[c * n + c] = 1.0 / variance;
+                l_right[c] = off / variance;
             }
         }
         let mut pl = vec![Vector3::zeros(); n];
