@@ -252,6 +252,22 @@ fn a_pushed_carton_costs_its_friction() {
     assert!((plant.body_poses()[0].x - 1.0).abs() < 0.005 && plant.truth().x < 0.64, "{:?}", plant.body_poses()[0]);
 }
 
+/// A carton in a corner keeps rapier at work in every substep; far from everything, the path is the same bit by bit.
+#[test]
+fn leaving_rapier_out_in_free_motion_changes_no_bit() {
+    let far = "[[obstacles]]\nname = \"carton\"\nshape = { disc = { radius_m = 0.2 } }\nposition_m = [-3.5, -3.5]\n\
+               height_m = 0.5\ntexture = { family = \"plain\" }\nmotion = { pushed = { mass_kg = 1.0 } }";
+    let run = |more: &str| {
+        let mut plant = RapierPlant::new(&world("", more), Pose::new(0.3, -0.2, 0.4), Seed(1));
+        let steps: Vec<_> = [(0.3, 0.5), (0.1, -1.0), (0.3, 0.0), (-0.2, 0.8)]
+            .into_iter()
+            .map(|(v, omega)| plant.step(Twist { v, omega }, 2.0))
+            .collect();
+        (plant.truth(), steps)
+    };
+    assert_eq!(run(""), run(far));
+}
+
 #[test]
 fn presets_fill_what_is_left_out() {
     let with = |robot: &str| {

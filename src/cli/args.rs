@@ -67,6 +67,8 @@ pub enum Command {
     /// Drive a table of commands open loop and record truth, odometry, wheels, slip and forces
     #[command(after_help = DRIVE_HELP)]
     Drive(DriveArgs),
+    /// Hold the physics against its closed forms: a page of charts, and the slip map
+    PhysicsReport(PhysicsReportArgs),
     /// Render one panorama with range and instance ids
     #[command(after_help = EXIT_CODES)]
     Render(RenderArgs),
@@ -144,6 +146,14 @@ pub struct DriveArgs {
     /// Folder for the results [default: results/runs/drive-WORLD-SEED]
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
+}
+
+/// Arguments of `physics-report`.
+#[derive(Debug, clap::Args)]
+pub struct PhysicsReportArgs {
+    /// Folder for the page; trajectories of another engine that lie there are shown too
+    #[arg(long, value_name = "DIR", default_value = "results/physics")]
+    pub out: PathBuf,
 }
 
 /// Arguments of `render`.

@@ -7,6 +7,7 @@ pub mod args;
 mod context;
 mod drive;
 mod home;
+mod physics_report;
 mod render;
 mod world;
 
@@ -30,6 +31,7 @@ pub fn run(args: Args) -> Result<Verdict> {
     match args.command {
         Command::Drive(args) => drive::run(&args, &context),
         Command::Home(args) => home::run(&args, &context),
+        Command::PhysicsReport(args) => physics_report::run(&args, &context),
         Command::Render(args) => render::run(&args, &context),
         Command::World(args) => world::run(&args, &context),
     }

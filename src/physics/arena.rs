@@ -104,6 +104,16 @@ impl Arena {
         Self { physics, robot, hull, movers, loose, touching: Vec::new() }
     }
 
+    /// Takes over where the moving bodies are, after substeps without rapier, in which the robot touched nothing.
+    pub(super) fn resume(&mut self, poses: &[Pose]) {
+        for &(index, handle) in &self.movers {
+            if let Some(body) = self.physics.bodies.get_mut(handle) {
+                body.set_position(rapier_pose(&poses[index]), false);
+            }
+        }
+        self.touching.clear();
+    }
+
     /// Where each moving body will be at the end of the next substep.
     pub(super) fn lead_bodies(&mut self, poses: &[Pose]) {
         for &(index, handle) in &self.movers {

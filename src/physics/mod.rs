@@ -13,7 +13,8 @@
 //! 0. lets happen what the world has in store (`script`: kicks, kidnaps, wheels that break),
 //! 1. clamps and slews the commanded twist into wheel-speed references (`drive`),
 //! 2. solves motors, wheels and floor friction together for the velocity at its end (`chassis`, `motor`, `contact`),
-//! 3. hands that velocity to rapier, which changes it only where the robot touches something (`arena`),
+//! 3. where anything is near (`vicinity`), hands that velocity to rapier, which changes it only where the robot touches
+//!    something (`arena`),
 //! 4. moves on: in f64 where the robot is free, by rapier's displacement where it touches.
 //!
 //! Rapier works in f32. At 7 m from the origin a substep's 0.3 mm is 630 units in the last place, so rounding alone would
@@ -32,6 +33,7 @@ mod rapier_plant;
 mod script;
 mod slide;
 mod unicycle;
+mod vicinity;
 
 use crate::geometry::{Pose, Twist};
 use crate::observation::Odometry;

@@ -17,7 +17,7 @@ pub(super) fn contains(corners: &[Vector2<f64>], point: Vector2<f64>) -> bool {
 }
 
 /// Distance from `point` to the segment from `a` to `b`.
-fn distance_to_segment(point: Vector2<f64>, a: Vector2<f64>, b: Vector2<f64>) -> f64 {
+pub(super) fn distance_to_segment(point: Vector2<f64>, a: Vector2<f64>, b: Vector2<f64>) -> f64 {
     let along = b - a;
     let length_squared = along.norm_squared();
     let t = if length_squared > 0.0 { ((point - a).dot(&along) / length_squared).clamp(0.0, 1.0) } else { 0.0 };

@@ -8,6 +8,7 @@ use super::motor::WheelDrive;
 use super::movers::{Movers, Walkway};
 use super::polygon::contains;
 use super::script::{Event, Script};
+use super::vicinity::Vicinity;
 use super::{Collision, Plant, PlantStep};
 use crate::geometry::{Pose, Twist, Vector2};
 use crate::random::Seed;
@@ -35,6 +36,9 @@ pub struct RapierPlant {
     floor: Floor,
     movers: Movers,
     arena: Arena,
+    vicinity: Vicinity,
+    /// Whether rapier took part in the last substep.
+    near: bool,
     radius: f64,
     substep_s: f64,
     /// Time since the start, s.
@@ -75,6 +79,8 @@ impl RapierPlant {
             seized: [false; 2],
             floor: Floor { friction: world.spec.floor.friction, zones: world.zones.clone() },
             movers: Movers::new(world, seed),
+            vicinity: Vicinity::new(world, start.position()),
+            near: false,
             radius: robot.radius_m,
             substep_s: SUBSTEP_S,
             clock_s: 0.0,
@@ -102,6 +108,40 @@ impl RapierPlant {
         &self.floor_contact
     }
 
+    /// Moves everything from `time_s` on for `dt` seconds. `target` are rim speeds, m/s.
+    fn substep(&mut self, target: [f64; 2], time_s: f64, dt: f64) {
+        while let Some(event) = self.script.due(time_s) {
+            self.suffer(event);
+        }
+        let mut drives = self.limiter.slew(target, dt).map(WheelDrive::Speed);
+        for (drive, _) in drives.iter_mut().zip(self.seized).filter(|(_, seized)| *seized) {
+            *drive = WheelDrive::Locked;
+        }
+        self.chassis.kick(drives, |point| self.floor.friction_at(point), dt);
+
+        let (pose, velocity) = (self.chassis.pose(), self.chassis.velocity());
+        let near = !self.vicinity.is_clear(pose.position(), velocity.linear.norm(), self.movers.poses(), dt);
+        if near && !self.near {
+            self.arena.resume(self.movers.poses());
+        }
+        self.near = near;
+        self.movers.advance(Walkway { robot: pose.position(), radius: self.radius }, dt);
+        if !near {
+            return self.chassis.drift(dt);
+        }
+        self.arena.lead_bodies(self.movers.poses());
+        let outcome = self.arena.step(&pose, &velocity, dt);
+        match outcome.touch {
+            Some(touch) => self.chassis.adopt(touch.displacement, touch.turn, touch.velocity),
+            None => self.chassis.drift(dt),
+        }
+        for (index, pose) in self.arena.loose_poses() {
+            self.movers.place(index, pose);
+        }
+        let hit = |(with, impulse_n_s)| Collision { time_s: time_s + dt, with, impulse_n_s };
+        self.collisions.extend(outcome.began.into_iter().map(hit));
+    }
+
     fn suffer(&mut self, event: Event) {
         match event {
             Event::Kick(impulse, turn) => {
@@ -112,9 +152,14 @@ impl RapierPlant {
             Event::Break(wheel, WheelFault::SeizedMotor) => self.seized[wheel] = true,
             Event::Break(wheel, WheelFault::DeadEncoder) => self.encoders.kill(wheel),
             Event::Break(wheel, WheelFault::WornTyre { friction_factor, radius_factor }) => {
-                self.chassis.wear_tyre(wheel, friction_factor, radius_factor);
+                self.wear_tyre(wheel, friction_factor, radius_factor);
             }
         }
+    }
+
+    /// Changes the tyre of wheel `k` (0 left, 1 right); see [`Chassis::wear_tyre`].
+    pub fn wear_tyre(&mut self, k: usize, friction_factor: f64, radius_factor: f64) {
+        self.chassis.wear_tyre(k, friction_factor, radius_factor);
     }
 
     /// Adds to the robot's velocity at once, as a push from outside does. The wheels learn of it through the floor.
@@ -134,29 +179,8 @@ impl Plant for RapierPlant {
         let dt = dt_s / substeps;
         let mut mean = FloorContact::default();
         self.collisions.clear();
-        for k in 1..=substeps as u64 {
-            while let Some(event) = self.script.due(self.clock_s + (k - 1) as f64 * dt) {
-                self.suffer(event);
-            }
-            let mut drives = self.limiter.slew(target, dt).map(WheelDrive::Speed);
-            for (drive, _) in drives.iter_mut().zip(self.seized).filter(|(_, seized)| *seized) {
-                *drive = WheelDrive::Locked;
-            }
-            self.chassis.kick(drives, |point| self.floor.friction_at(point), dt);
-            let pose = self.chassis.pose();
-            self.movers.advance(Walkway { robot: pose.position(), radius: self.radius }, dt);
-            self.arena.lead_bodies(self.movers.poses());
-            let outcome = self.arena.step(&pose, &self.chassis.velocity(), dt);
-            match outcome.touch {
-                Some(touch) => self.chassis.adopt(touch.displacement, touch.turn, touch.velocity),
-                None => self.chassis.drift(dt),
-            }
-            for (index, pose) in self.arena.loose_poses() {
-                self.movers.place(index, pose);
-            }
-            let time_s = self.clock_s + k as f64 * dt;
-            let began = outcome.began.into_iter();
-            self.collisions.extend(began.map(|(with, impulse_n_s)| Collision { time_s, with, impulse_n_s }));
+        for k in 0..substeps as u64 {
+            self.substep(target, self.clock_s + k as f64 * dt, dt);
             mean.add(&self.chassis);
         }
         self.clock_s += dt_s;

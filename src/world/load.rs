@@ -17,12 +17,13 @@ use crate::geometry::{Pose, Vector2};
 use crate::panorama::INSTANCE_FIRST_WALL;
 
 /// The worlds that the program carries with it, as (name, TOML text).
-const BUILTIN: [(&str, &str); 6] = [
+const BUILTIN: [(&str, &str); 7] = [
     ("lab", include_str!("../../worlds/lab.toml")),
     ("slippery", include_str!("../../worlds/slippery.toml")),
     ("crowd", include_str!("../../worlds/crowd.toml")),
     ("paper-ideal", include_str!("../../worlds/paper-ideal.toml")),
     ("paper-grid", include_str!("../../worlds/paper-grid.toml")),
+    ("proving-ground", include_str!("../../worlds/proving-ground.toml")),
     ("vardy-hall", include_str!("../../worlds/vardy-hall.toml")),
 ];
 

@@ -1,0 +1,61 @@
+//! `wayhome physics-report`: the physics against its closed forms, as a page.
+
+use anyhow::Result;
+use serde::Serialize;
+use wayhome::report::{OutputFolder, physics as physics_report};
+use wayhome::study::physics;
+
+use super::Verdict;
+use super::args::PhysicsReportArgs;
+use super::context::Context;
+
+/// What `--json` prints.
+#[derive(Serialize)]
+struct Output {
+    closed_forms: Vec<Form>,
+    out: String,
+}
+
+/// A closed form in numbers.
+#[derive(Serialize)]
+struct Form {
+    name: &'static str,
+    equation: &'static str,
+    greatest_difference: f64,
+    allowed: f64,
+}
+
+pub fn run(args: &PhysicsReportArgs, context: &Context) -> Result<Verdict> {
+    let folder = OutputFolder::open(&args.out, "physics-report", physics_report::FILES)?;
+    // What another engine made of the same drives is kept and shown.
+    let outside = std::fs::read_to_string(args.out.join(physics_report::OUTSIDE)).ok();
+    let findings = physics_report::Findings {
+        closed_forms: physics::closed_forms()?,
+        energy: physics::energy(),
+        convergence: physics::convergence()?,
+        slip_map: physics::slip_map()?,
+        outside,
+    };
+    physics_report::write(folder, &findings)?;
+    let forms = findings.closed_forms.iter().map(|f| Form {
+        name: f.name,
+        equation: f.equation,
+        greatest_difference: f.worst,
+        allowed: f.tolerance,
+    });
+    let output = Output { closed_forms: forms.collect(), out: args.out.display().to_string() };
+    context.print(&output, || {
+        let mut text = String::new();
+        for form in &output.closed_forms {
+            text += &format!(
+                "{:20} {:44} off by {:9.5} % at most, {} % allowed\n",
+                form.name,
+                form.equation,
+                100.0 * form.greatest_difference,
+                100.0 * form.allowed
+            );
+        }
+        text + &format!("files in {}\n", output.out)
+    })?;
+    Ok(Verdict::Done)
+}
