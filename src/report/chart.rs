@@ -371,7 +371,7 @@ mod tests {
         let middle = format!("cx=\"{}\" cy=\"{}\"", px(0.5 * (left + right)), px(0.5 * (top + bottom)));
         assert!(svg.contains(&middle), "{svg}");
         assert_eq!(svg.matches("<circle").count(), 1, "what is not finite is left out");
-        assert_eq!(svg.matches(">10<").count(), 2, "a tick at 10 on each axis");
+        assert_eq!(svg.lines().filter(|line| *line == "10").count(), 2, "a tick at 10 on each axis");
     }
 
     #[test]
@@ -388,7 +388,7 @@ mod tests {
         let (x, y) = (Axis::linear("x"), Axis::log("y"));
         assert_eq!(rims(&map.x, &x), [0.5, 1.5, 2.5]);
         assert!((rims(&map.y, &y)[1] - 10.0_f64.sqrt()).abs() < 1e-12);
-        assert!(Chart::new("t", x, y).heat(map).to_svg().contains(">3.0<"));
+        assert!(Chart::new("t", x, y).heat(map).to_svg().lines().any(|line| line == "3.0"));
         assert_eq!(wrapped("a long label of words", 11), ["a long", "label of", "words"]);
     }
 }

@@ -202,7 +202,8 @@ fn launch() -> ClosedForm {
 fn yaw_braking() -> ClosedForm {
     let robot = plain_robot();
     let inertia = Chassis::new(&robot, Pose::IDENTITY).yaw_inertia();
-    let exact = move |mu: f64| mu * robot.mass_kg * G * 0.5 * robot.track_m / inertia;
+    let full = robot.mass_kg * G * 0.5 * robot.track_m / inertia;
+    let exact = move |mu: f64| mu * full;
     let measure = |mu: f64| {
         let mut chassis = Chassis::new(&plain_robot(), Pose::IDENTITY);
         chassis.set_velocity(moving(0.0, 0.0, 30.0));
@@ -211,7 +212,7 @@ fn yaw_braking() -> ClosedForm {
         }
         (30.0 - chassis.velocity().yaw_rate) / 0.2
     };
-    let curves = vec![curve("spun, wheels locked".into(), 0.0, &grid(0.05, 0.8, 11), &exact, measure)];
+    let curves = vec![curve("spun, wheels locked".into(), 0.0, &grid(0.05, 0.8, 11), exact, measure)];
     ClosedForm {
         name: "yaw-braking",
         title: "Locked wheels brake a spin",

@@ -1,9 +1,13 @@
 //! How many substeps of 1 ms the plant does per second on one core, and which part of that is rapier's.
 //!
 //! `cargo bench --bench physics`. Throughput is in substeps: "Melem/s" reads as millions of substeps a second.
-//! - `plant/open floor`: one robot, 4 walls, 10 standing and 5 moving bodies, far enough from all of them.
+//! - `plant/open floor`: one robot, 4 walls, 10 standing and 5 moving bodies, far enough from all of them
+//!   for rapier to be left out.
 //! - `plant/at a wall`: the same, pressed against a wall: rapier steps in every substep.
 //! - `chassis`: motors, wheels and floor friction alone.
+//!
+//! Measured in November 2026 on one core of a shared server: 1.7 million substeps a second of the processor's time on the open
+//! floor, of which the chassis takes nine tenths and moving bodies the rest; 0.13 million at a wall, where rapier takes 92 %.
 
 #![allow(clippy::unwrap_used, missing_docs)]
 
