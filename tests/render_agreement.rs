@@ -14,7 +14,7 @@ use wayhome::geometry::{Pose, Vector2};
 use wayhome::panorama::{Panorama, Projection};
 use wayhome::random::{Seed, Stream};
 use wayhome::render::{CpuRenderer, GpuRenderer, Renderer, Scene, View};
-use wayhome::world::{Footprint, World};
+use wayhome::world::World;
 
 /// Most pixels whose instance or range may differ, as a share: outlines, where the last bit decides.
 const OUTLINES: f64 = 1e-3;
@@ -76,9 +76,9 @@ height_m = 0.25
 texture = { family = "noise" }
 "#;
 
-/// A crowd: many bodies behind one another.
-fn crowd() -> String {
-    let mut text = "name = \"crowd\"\nhome = { x_m = 0, y_m = 0 }\n[room]\n\
+/// Many bodies behind one another.
+fn forest() -> String {
+    let mut text = "name = \"forest\"\nhome = { x_m = 0, y_m = 0 }\n[room]\n\
         outline_m = [[-8, -6], [8, -6], [8, 6], [-8, 6]]\nheight_m = 3\nwalls = [{ family = \"posters\" }]\n[light]\n\
         ambient = 0.3\nlamps = [{ position_m = [0, 0, 2.8], intensity = 3 }, { position_m = [6, -3, 1], intensity = 1 }]\n"
         .to_owned();
@@ -115,47 +115,23 @@ fn device() -> Option<MutexGuard<'static, GpuRenderer>> {
     device.as_ref().map(|d| d.lock().unwrap_or_else(std::sync::PoisonError::into_inner))
 }
 
-fn load(text: &str) -> World {
-    let folder = tempfile::tempdir().unwrap();
-    let path: PathBuf = folder.path().join("world.toml");
-    std::fs::write(&path, text).unwrap();
-    World::load(&path).unwrap()
-}
-
 fn between(stream: &mut Stream, low: f64, high: f64) -> f64 {
     low + (high - low) * (stream.next_u64() >> 11) as f64 / (1_u64 << 53) as f64
 }
 
-/// A pose in the room, 5 cm away from walls and bodies.
-fn free_pose(world: &World, stream: &mut Stream) -> Pose {
+/// A free pose of the robot, and bodies that have turned.
+fn free_pose(world: &World, stream: &mut Stream) -> (Pose, Vec<Pose>) {
+    let turned = |p: Pose, stream: &mut Stream| Pose::new(p.x, p.y, p.heading + between(stream, -0.5, 0.5));
+    let bodies: Vec<_> = world.body_poses().into_iter().map(|p| turned(p, stream)).collect();
     let reach = |f: fn(&Vector2<f64>) -> f64| {
         let all = world.outline.iter().map(f);
         (all.clone().fold(f64::MAX, f64::min), all.fold(f64::MIN, f64::max))
     };
     let ((x0, x1), (y0, y1)) = (reach(|p| p.x), reach(|p| p.y));
     loop {
-        let p = Vector2::new(between(stream, x0, x1), between(stream, y0, y1));
-        let mut inside = false;
-        let mut clear = true;
-        for (k, a) in world.outline.iter().enumerate() {
-            let b = world.outline[(k + 1) % world.outline.len()];
-            if (a.y > p.y) != (b.y > p.y) && p.x < a.x + (p.y - a.y) / (b.y - a.y) * (b.x - a.x) {
-                inside = !inside;
-            }
-            let d = b - a;
-            let s = ((p - a).dot(&d) / d.dot(&d)).clamp(0.0, 1.0);
-            clear &= (p - a - d * s).norm() > 0.05;
-        }
-        for body in &world.bodies {
-            let q = body.pose.inverse_transform(p);
-            let radius = match &body.footprint {
-                Footprint::Disc(radius) => *radius,
-                Footprint::Polygon(corners) => corners.iter().map(|c| c.norm()).fold(0.0, f64::max),
-            };
-            clear &= body.bottom_m > 1.0 || q.norm() > radius + 0.05;
-        }
-        if inside && clear {
-            return Pose::new(p.x, p.y, between(stream, -3.2, 3.2));
+        let pose = Pose::new(between(stream, x0, x1), between(stream, y0, y1), between(stream, -3.2, 3.2));
+        if world.is_free(&pose, 0.0, &bodies).is_ok() {
+            return (pose, bodies);
         }
     }
 }
@@ -200,18 +176,19 @@ fn keep_evidence(name: &str, cpu: &Panorama, gpu: &Panorama) -> PathBuf {
 fn gpu_and_cpu_agree() {
     let Some(mut gpu) = device() else { return };
     let mut cpu = CpuRenderer::new();
-    let lab = World::load(Path::new(env!("CARGO_MANIFEST_DIR")).join("worlds/lab.toml").as_path()).unwrap();
+    let file = |name: &str| World::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("worlds").join(name)).unwrap();
+    let text = |text: &str| World::from_toml(text, "test").unwrap();
     let mut stream = Seed(1).stream("agreement");
     let (mut worst, mut total, mut pictures) = ((0.0_f64, 0.0_f64), (0.0, 0.0), 0.0);
-    for world in [lab, load(CELLAR), load(&crowd())] {
+    for world in [file("lab.toml"), file("crowd.toml"), text(CELLAR), text(&forest())] {
         let name = world.spec.name.clone();
         let scene = Scene::new(&world).unwrap();
-        let bodies = world.body_poses();
         for k in 0..24 {
             // Sizes that are no multiple of a workgroup or a band, too.
             let (width, height) = [(561, 81), (720, 90), (1000, 130)][k % 3];
             let projection = Projection { mount_rad: 0.1 * k as f64, ..world.projection_of_size(width, height) };
-            let view = View { projection, robot: free_pose(&world, &mut stream), bodies: &bodies };
+            let (robot, bodies) = free_pose(&world, &mut stream);
+            let view = View { projection, robot, bodies: &bodies };
             let (mut a, mut b) = (Panorama::black(projection), Panorama::black(Projection::new(4, 4)));
             cpu.render(&scene, &view, &mut a).unwrap();
             gpu.render(&scene, &view, &mut b).unwrap();
@@ -243,7 +220,7 @@ fn gpu_and_cpu_agree() {
 #[test]
 fn a_picture_beyond_the_device_is_refused() {
     let Some(mut gpu) = device() else { return };
-    let world = load(CELLAR);
+    let world = World::from_toml(CELLAR, "test").unwrap();
     let scene = Scene::new(&world).unwrap();
     let bodies = world.body_poses();
     let projection = Projection::new(1 << 23, 2);

@@ -1,6 +1,6 @@
 //! The renderer on a graphics adapter: one compute shader through wgpu.
 
-use std::sync::{Arc, Mutex, mpsc};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError, mpsc};
 use std::time::Duration;
 
 use wgpu::util::DeviceExt;
@@ -31,64 +31,52 @@ const HARDWARE_ROWS: u32 = 16;
 /// A picture that takes longer has failed.
 const TIMEOUT: Duration = Duration::from_secs(60);
 
-/// The GPU renderer.
-///
-/// It keeps its buffers, and the scene that it rendered last, on the device.
+/// What the process has of graphics: making several devices at once has crashed drivers, so that all renderers share one.
+static SHARED: Mutex<Option<Arc<Shared>>> = Mutex::new(None);
+
+/// A device and what was made on it once.
 #[derive(Debug)]
-pub struct GpuRenderer {
+struct Shared {
     info: RendererInfo,
+    software: bool,
     device: wgpu::Device,
     queue: wgpu::Queue,
     pipeline: wgpu::ComputePipeline,
-    software: bool,
-    frame: Frame,
-    params: Table,
-    directions: Table,
-    rows: Table,
-    edges: Table,
-    bodies: Table,
-    lamps: Table,
-    /// Materials and atlas of the scene of this id.
-    scene: Option<(u64, wgpu::Buffer, wgpu::Buffer)>,
-    picture: Table,
-    readback: Table,
-    bindings: Option<wgpu::BindGroup>,
     /// What the device has complained of since it was last asked.
     complaints: Complaints,
+    /// Why the device is gone, once it is.
+    lost: Arc<OnceLock<String>>,
 }
 
 type Complaints = Arc<Mutex<Vec<String>>>;
 
-impl GpuRenderer {
-    /// A renderer on the best adapter there is: discrete before integrated before virtual before software.
-    ///
-    /// # Errors
-    /// [`Error::NoAdapter`] where there is none, [`Error::Gpu`] where it does not take the shader.
-    pub fn new() -> Result<Self> {
-        Self::on(|_| true)
+impl Shared {
+    /// The shared device, made on first use and again once it was lost.
+    fn get(software_allowed: bool) -> Result<Arc<Self>> {
+        let mut shared = SHARED.lock().unwrap_or_else(PoisonError::into_inner);
+        // It is on the best adapter there is: if that is software, there is no hardware.
+        if let Some(shared) = shared.as_ref().filter(|s| s.lost.get().is_none()) {
+            return if shared.software && !software_allowed {
+                Err(Error::NoAdapter("none of hardware".to_owned()))
+            } else {
+                Ok(Arc::clone(shared))
+            };
+        }
+        let made = Arc::new(Self::new(software_allowed)?);
+        *shared = Some(Arc::clone(&made));
+        Ok(made)
     }
 
-    /// A renderer on a hardware adapter.
-    ///
-    /// # Errors
-    /// As [`GpuRenderer::new`]; [`Error::NoAdapter`] also where all adapters are software.
-    pub fn on_hardware() -> Result<Self> {
-        Self::on(|kind| kind < 3)
-    }
-
-    fn on(allowed: impl Fn(u32) -> bool) -> Result<Self> {
+    fn new(software_allowed: bool) -> Result<Self> {
         let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle());
         let adapters = pollster::block_on(instance.enumerate_adapters(wgpu::Backends::all()));
-        let count = adapters.len();
+        let why = if adapters.is_empty() { "none found" } else { "none of hardware" };
         let adapter = adapters
             .into_iter()
-            .filter(|a| allowed(rank(a.get_info().device_type)))
+            .filter(|a| software_allowed || is_hardware(a.get_info().device_type))
             .min_by_key(|a| rank(a.get_info().device_type))
-            .ok_or_else(|| {
-                Error::NoAdapter(if count == 0 { "none found".to_owned() } else { format!("{count} found, none of hardware") })
-            })?;
+            .ok_or_else(|| Error::NoAdapter(why.to_owned()))?;
         let about = adapter.get_info();
-        let software = about.device_type == wgpu::DeviceType::Cpu;
         let info = RendererInfo {
             kind: "gpu".to_owned(),
             adapter: format!("{} ({})", about.name, about.backend),
@@ -101,23 +89,17 @@ impl GpuRenderer {
             ..wgpu::Limits::default()
         };
         let request = wgpu::DeviceDescriptor { label: Some("wayhome"), required_limits, ..Default::default() };
-        let (device, queue) = pollster::block_on(adapter.request_device(&request)).map_err(|e| Error::Gpu(e.to_string()))?;
+        let (device, queue) = pollster::block_on(adapter.request_device(&request)).map_err(|e| gpu_error(&e))?;
         let complaints = Complaints::default();
-        let keep = |complaints: &Complaints| {
-            let complaints = Arc::clone(complaints);
-            move |text: String| {
-                if let Ok(mut list) = complaints.lock() {
-                    list.push(text);
-                }
-            }
-        };
-        let errors = keep(&complaints);
-        device.on_uncaptured_error(Arc::new(move |e: wgpu::Error| errors(e.to_string())));
-        let lost = keep(&complaints);
+        let list = Arc::clone(&complaints);
+        device.on_uncaptured_error(Arc::new(move |e: wgpu::Error| {
+            list.lock().unwrap_or_else(PoisonError::into_inner).push(e.to_string());
+        }));
+        let lost = Arc::new(OnceLock::new());
+        let why = Arc::clone(&lost);
         device.set_device_lost_callback(move |reason, text| {
-            if reason != wgpu::DeviceLostReason::Destroyed {
-                lost(format!("device lost: {text}"));
-            }
+            // Only the first reason counts.
+            let _ = why.set(format!("device lost ({reason:?}): {text}"));
         });
         let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
             label: Some("panorama"),
@@ -131,13 +113,64 @@ impl GpuRenderer {
             compilation_options: wgpu::PipelineCompilationOptions::default(),
             cache: None,
         });
-        check(&complaints)?;
+        let software = !is_hardware(about.device_type);
+        let shared = Self { info, software, device, queue, pipeline, complaints, lost };
+        shared.check()?;
+        Ok(shared)
+    }
+
+    /// Turns what the device has complained of into an error.
+    fn check(&self) -> Result<()> {
+        if let Some(why) = self.lost.get() {
+            return Err(Error::Gpu(why.clone()));
+        }
+        let complaints = std::mem::take(&mut *self.complaints.lock().unwrap_or_else(PoisonError::into_inner));
+        if complaints.is_empty() { Ok(()) } else { Err(Error::Gpu(complaints.join("; "))) }
+    }
+}
+
+/// The GPU renderer.
+///
+/// All renderers of a process share one device. Each keeps its own buffers there, and the scene that it rendered last.
+#[derive(Debug)]
+pub struct GpuRenderer {
+    shared: Arc<Shared>,
+    frame: Frame,
+    params: Table,
+    directions: Table,
+    rows: Table,
+    edges: Table,
+    bodies: Table,
+    lamps: Table,
+    /// Materials and atlas of the scene of this id.
+    scene: Option<(u64, wgpu::Buffer, wgpu::Buffer)>,
+    picture: Table,
+    readback: Table,
+    bindings: Option<wgpu::BindGroup>,
+}
+
+impl GpuRenderer {
+    /// A renderer on the best adapter there is: discrete before integrated before virtual before software.
+    ///
+    /// # Errors
+    /// [`Error::NoAdapter`] where there is none, [`Error::Gpu`] where it does not take the shader.
+    pub fn new() -> Result<Self> {
+        Ok(Self::on(Shared::get(true)?))
+    }
+
+    /// A renderer on a hardware adapter.
+    ///
+    /// # Errors
+    /// As [`GpuRenderer::new`]; [`Error::NoAdapter`] also where all adapters are software.
+    pub fn on_hardware() -> Result<Self> {
+        Ok(Self::on(Shared::get(false)?))
+    }
+
+    fn on(shared: Arc<Shared>) -> Self {
         let storage = wgpu::BufferUsages::STORAGE;
         let input = storage | wgpu::BufferUsages::COPY_DST;
-        Ok(Self {
-            info,
-            pipeline,
-            software,
+        Self {
+            shared,
             frame: Frame::new(),
             params: Table::new("params", wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST),
             directions: Table::new("directions", input),
@@ -149,27 +182,24 @@ impl GpuRenderer {
             picture: Table::new("picture", storage | wgpu::BufferUsages::COPY_SRC),
             readback: Table::new("readback", wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST),
             bindings: None,
-            device,
-            queue,
-            complaints,
-        })
+        }
     }
 
     /// Refuses what the device cannot hold, before it is asked to.
     fn check_size(&self, scene: &Scene, view: &View<'_>) -> Result<()> {
-        let limits = self.device.limits();
+        let limits = self.shared.device.limits();
         let most = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
         let p = &view.projection;
         let bytes = p.pixels() as u64 * PIXEL_BYTES;
         let columns = limits.max_compute_workgroups_per_dimension.saturating_mul(WORKGROUP);
         if bytes > most || p.width > columns {
-            let allowed = format!("up to {} pixels and {columns} columns on {}", most / PIXEL_BYTES, self.info.adapter);
+            let allowed = format!("up to {} pixels and {columns} columns on {}", most / PIXEL_BYTES, self.shared.info.adapter);
             let found = format!("{} x {} = {} pixels", p.width, p.height, p.pixels());
             return Err(Error::Invalid { what: "panorama size".to_owned(), found, allowed });
         }
         let atlas = 4 * scene.atlas.len() as u64;
         if atlas > most {
-            let (found, allowed) = (format!("{atlas} bytes"), format!("up to {most} bytes on {}", self.info.adapter));
+            let (found, allowed) = (format!("{atlas} bytes"), format!("up to {most} bytes on {}", self.shared.info.adapter));
             return Err(Error::Invalid { what: "size of all textures".to_owned(), found, allowed });
         }
         Ok(())
@@ -177,7 +207,7 @@ impl GpuRenderer {
 
     /// Puts scene, tables and room for the picture on the device.
     fn upload(&mut self, scene: &Scene, bytes: u64) {
-        let (device, queue, frame) = (&self.device, &self.queue, &self.frame);
+        let (device, queue, frame) = (&self.shared.device, &self.shared.queue, &self.frame);
         let mut moved = false;
         moved |= self.params.write(device, queue, bytemuck::bytes_of(&frame.params));
         moved |= self.directions.write(device, queue, bytemuck::cast_slice(&frame.directions));
@@ -206,7 +236,6 @@ impl GpuRenderer {
         if self.bindings.is_some() {
             return Ok(());
         }
-        let missing = || Error::Gpu("a buffer could not be made".to_owned());
         let (_, materials, atlas) = self.scene.as_ref().ok_or_else(missing)?;
         let tables = [&self.params, &self.directions, &self.rows, &self.edges, &self.bodies, &self.lamps];
         let mut buffers = Vec::with_capacity(9);
@@ -218,48 +247,49 @@ impl GpuRenderer {
             .zip(&buffers)
             .map(|(binding, b)| wgpu::BindGroupEntry { binding, resource: b.as_entire_binding() })
             .collect();
-        self.bindings = Some(self.device.create_bind_group(&wgpu::BindGroupDescriptor {
+        self.bindings = Some(self.shared.device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("panorama"),
-            layout: &self.pipeline.get_bind_group_layout(0),
+            layout: &self.shared.pipeline.get_bind_group_layout(0),
             entries: &entries,
         }));
         Ok(())
     }
 
-    fn dispatch(&self, bytes: u64) -> Result<()> {
+    /// Starts a picture and its way back; the receiver hears when it has arrived.
+    fn dispatch(&self, bytes: u64) -> Result<(wgpu::SubmissionIndex, MapOutcome)> {
         let (Some(picture), Some(readback)) = (&self.picture.buffer, &self.readback.buffer) else {
-            return Err(Error::Gpu("a buffer could not be made".to_owned()));
+            return Err(missing());
         };
         let p = &self.frame.params;
-        let mut encoder = self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        let mut encoder = self.shared.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         {
             let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
-            pass.set_pipeline(&self.pipeline);
+            pass.set_pipeline(&self.shared.pipeline);
             pass.set_bind_group(0, &self.bindings, &[]);
             pass.dispatch_workgroups(p.width.div_ceil(WORKGROUP), p.height.div_ceil(p.rows_per_invocation), 1);
         }
         encoder.copy_buffer_to_buffer(picture, 0, readback, 0, bytes);
-        self.queue.submit([encoder.finish()]);
-        Ok(())
-    }
-
-    fn read(&self, view: &View<'_>, bytes: u64, out: &mut Panorama) -> Result<()> {
-        let failed = |e: &dyn std::fmt::Display| Error::Gpu(e.to_string());
-        let Some(readback) = &self.readback.buffer else {
-            return Err(Error::Gpu("a buffer could not be made".to_owned()));
-        };
+        let submission = self.shared.queue.submit([encoder.finish()]);
         let (send, receive) = mpsc::channel();
         readback.map_async(wgpu::MapMode::Read, 0..bytes, move |result| {
             // The receiver is gone only when waiting has failed already.
             let _ = send.send(result);
         });
-        let wait = wgpu::PollType::Wait { submission_index: None, timeout: Some(TIMEOUT) };
-        self.device.poll(wait).map_err(|e| failed(&e))?;
-        check(&self.complaints)?;
-        receive.try_recv().map_err(|e| failed(&e))?.map_err(|e| failed(&e))?;
+        Ok((submission, receive))
+    }
+
+    fn read(&self, view: &View<'_>, bytes: u64, out: &mut Panorama) -> Result<()> {
+        let (submission, arrived) = self.dispatch(bytes)?;
+        let wait = wgpu::PollType::Wait { submission_index: Some(submission), timeout: Some(TIMEOUT) };
+        let polled = self.shared.device.poll(wait);
+        self.shared.check()?;
+        polled.map_err(|e| gpu_error(&e))?;
+        // Another renderer's thread may be the one to tell, a moment later.
+        arrived.recv_timeout(TIMEOUT).map_err(|e| gpu_error(&e))?.map_err(|e| gpu_error(&e))?;
+        let readback = self.readback.buffer.as_ref().ok_or_else(missing)?;
         {
-            let mapped = readback.get_mapped_range(0..bytes).map_err(|e| failed(&e))?;
-            let words: &[u32] = bytemuck::try_cast_slice(&mapped).map_err(|e| failed(&e))?;
+            let mapped = readback.get_mapped_range(0..bytes).map_err(|e| gpu_error(&e))?;
+            let words: &[u32] = bytemuck::try_cast_slice(&mapped).map_err(|e| gpu_error(&e))?;
             let pixels = view.projection.pixels();
             out.projection = view.projection;
             out.rgba.clear();
@@ -274,24 +304,41 @@ impl GpuRenderer {
     }
 }
 
+/// What mapping a buffer came to.
+type MapOutcome = mpsc::Receiver<std::result::Result<(), wgpu::BufferAsyncError>>;
+
+fn gpu_error(e: &dyn std::fmt::Display) -> Error {
+    Error::Gpu(e.to_string())
+}
+
+fn missing() -> Error {
+    Error::Gpu("a buffer could not be made".to_owned())
+}
+
 impl Renderer for GpuRenderer {
     fn render(&mut self, scene: &Scene, view: &View<'_>, out: &mut Panorama) -> Result<()> {
         self.check_size(scene, view)?;
         self.frame.prepare(scene, view)?;
-        if !self.software {
+        if !self.shared.software {
             self.frame.params.rows_per_invocation = HARDWARE_ROWS.min(view.projection.height);
         }
         let bytes = view.projection.pixels() as u64 * PIXEL_BYTES;
         self.upload(scene, bytes);
         self.bind()?;
-        check(&self.complaints)?;
-        self.dispatch(bytes)?;
-        self.read(view, bytes, out)
+        self.shared.check()?;
+        self.read(view, bytes, out).inspect_err(|_| {
+            // Who knows what state it is in.
+            self.readback.buffer = None;
+        })
     }
 
     fn info(&self) -> &RendererInfo {
-        &self.info
+        &self.shared.info
     }
+}
+
+fn is_hardware(kind: wgpu::DeviceType) -> bool {
+    rank(kind) < 3
 }
 
 /// Lower is better; from 3 on it is not hardware, or nobody knows.
@@ -303,12 +350,6 @@ fn rank(kind: wgpu::DeviceType) -> u32 {
         wgpu::DeviceType::Other => 3,
         wgpu::DeviceType::Cpu => 4,
     }
-}
-
-/// Turns what the device has complained of into an error.
-fn check(complaints: &Complaints) -> Result<()> {
-    let mut list = complaints.lock().map_err(|_| Error::Gpu("an error handler failed".to_owned()))?;
-    if list.is_empty() { Ok(()) } else { Err(Error::Gpu(std::mem::take(&mut *list).join("; "))) }
 }
 
 /// A buffer that grows with what is written to it.

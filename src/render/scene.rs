@@ -119,8 +119,8 @@ fn pack(textures: &[&TextureSpec]) -> (Vec<Material>, Vec<u32>) {
             })
         })
         .collect();
-    let log2_size = texture::log2_size(distinct.len());
-    let baked: Vec<texture::Baked> = distinct.par_iter().map(|t| texture::bake(t, log2_size)).collect();
+    let sizes = texture::log2_sizes(&distinct);
+    let baked: Vec<texture::Baked> = distinct.par_iter().zip(sizes).map(|(t, n)| texture::bake(t, n)).collect();
     let mut atlas = Vec::with_capacity(baked.iter().map(|b| b.texels.len()).sum());
     let packed: Vec<Material> = baked
         .iter()

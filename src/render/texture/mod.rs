@@ -25,16 +25,42 @@ pub(super) struct Baked {
 
 /// Most texels of an atlas: 128 MiB, what every graphics device binds as one buffer.
 const ATLAS_TEXELS: usize = 32 << 20;
+/// A tile is made as fine as this, in metres a texel, ...
+const COARSEST_M: f64 = 0.008;
+/// ... and finer, up to [`SMALL`] texels along an edge, unless its texels are as small as this already.
+const FINE_M: f64 = 0.004;
+const SMALL: u32 = 9;
+/// Most texels along an edge, as a binary logarithm.
+const LARGEST: u32 = 11;
 
-/// Binary logarithm of a tile's edge length, such that `count` tiles fit into the atlas: 512 texels, or less for a crowd.
-pub(super) fn log2_size(count: usize) -> u32 {
-    (4..9_u32).rev().map(|n| n + 1).find(|&n| count * (((4_usize << (2 * n)) - 1) / 3) <= ATLAS_TEXELS).unwrap_or(4)
+/// Binary logarithms of the tiles' edge lengths in texels. All are coarsened alike where the atlas would get too large.
+pub(super) fn log2_sizes(specs: &[&TextureSpec]) -> Vec<u32> {
+    let wanted = |spec: &TextureSpec| {
+        let reach = |texel_m: f64, most: u32| (0..most).find(|&n| f64::from(1 << n) * texel_m >= spec.period_m).unwrap_or(most);
+        match spec.family {
+            TextureFamily::Plain => 0,
+            _ => reach(COARSEST_M, LARGEST).max(reach(FINE_M, SMALL)).max(4),
+        }
+    };
+    let mut sizes: Vec<u32> = specs.iter().map(|s| wanted(s)).collect();
+    while sizes.iter().map(|&n| texels(n)).sum::<usize>() > ATLAS_TEXELS && sizes.iter().any(|&n| n > 2) {
+        for n in sizes.iter_mut().filter(|n| **n > 2) {
+            *n -= 1;
+        }
+    }
+    sizes
 }
 
-/// Draws a texture of 2^`log2_size` texels along each edge; a plain one has a single texel.
+/// Texels of all levels of a tile.
+fn texels(log2_size: u32) -> usize {
+    ((4 << (2 * log2_size)) - 1) / 3
+}
+
+/// Draws a texture of 2^`log2_size` texels along each edge.
 pub(super) fn bake(spec: &TextureSpec, log2_size: u32) -> Baked {
-    let log2_size = if spec.family == TextureFamily::Plain { 0 } else { log2_size };
-    let mut canvas = Canvas::new(2 << log2_size, spec.period_m, spec.colour.map(f32::from));
+    // Large tiles are drawn at their own resolution: what is beyond is seldom looked at so closely.
+    let twice = u32::from(log2_size <= SMALL);
+    let mut canvas = Canvas::new(1 << (log2_size + twice), spec.period_m, spec.colour.map(f32::from));
     let mut stream = Seed(spec.seed.unwrap_or(0)).stream("texture");
     match spec.family {
         TextureFamily::Plain => {}
@@ -47,12 +73,17 @@ pub(super) fn bake(spec: &TextureSpec, log2_size: u32) -> Baked {
         TextureFamily::Bands => patterns::bands(&mut canvas, &mut stream),
     }
     canvas.weaken(spec.contrast.clamp(0.0, 1.0) as f32);
-    let mut texels = Vec::with_capacity(((4 << (2 * log2_size)) - 1) / 3);
-    for _ in 0..=log2_size {
+    let mut all = Vec::with_capacity(texels(log2_size));
+    if twice == 1 {
         canvas.halve();
-        texels.extend(canvas.texels());
     }
-    Baked { log2_size, texels }
+    for level in 0..=log2_size {
+        if level > 0 {
+            canvas.halve();
+        }
+        all.extend(canvas.texels());
+    }
+    Baked { log2_size, texels: all }
 }
 
 #[cfg(test)]
@@ -73,10 +104,15 @@ mod tests {
     }
 
     #[test]
-    fn an_atlas_keeps_its_budget() {
-        assert_eq!(log2_size(10), 9);
-        for count in [10, 96, 97, 400, 5000] {
-            assert!(count * ((4 << (2 * log2_size(count))) - 1) / 3 <= ATLAS_TEXELS, "{count}");
+    fn an_atlas_keeps_its_budget_and_tiles_their_resolution() {
+        let of_period = |period_m| TextureSpec { period_m, ..spec(TextureFamily::Noise) };
+        let sizes =
+            |periods: &[f64]| log2_sizes(&periods.iter().map(|p| of_period(*p)).collect::<Vec<_>>().iter().collect::<Vec<_>>());
+        assert_eq!(sizes(&[1.0, 2.0, 4.0, 7.0, 16.0, 100.0]), [8, 9, 9, 10, 11, 11]);
+        for count in [1, 30, 100, 1000] {
+            let sizes = sizes(&vec![16.0; count]);
+            assert!(sizes.iter().map(|n| texels(*n)).sum::<usize>() <= ATLAS_TEXELS, "{count}");
         }
+        assert_eq!(bake(&of_period(7.0), 10).texels.len(), texels(10));
     }
 }
