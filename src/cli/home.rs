@@ -108,6 +108,7 @@ fn setup(args: &HomeArgs) -> Result<Setup, Error> {
         start: args.start.clone(),
         initial_estimate: args.initial_estimate,
         time_limit_s: args.time_limit_s,
+        ..Setup::default()
     })
 }
 
