@@ -113,7 +113,7 @@ fn setup(args: &HomeArgs) -> Result<Setup, Error> {
 }
 
 /// Refuses a flag that would do nothing with the sensor that was chosen.
-fn needs_bearings(given: bool, flag: &str, found: Bearings, needed: Bearings) -> Result<(), Error> {
+pub fn needs_bearings(given: bool, flag: &str, found: Bearings, needed: Bearings) -> Result<(), Error> {
     if !given || found == needed {
         return Ok(());
     }

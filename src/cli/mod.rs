@@ -7,6 +7,7 @@ pub mod args;
 mod context;
 mod home;
 mod render;
+mod robustness;
 mod world;
 
 use anyhow::Result;
@@ -28,6 +29,7 @@ pub fn run(args: Args) -> Result<Verdict> {
     let context = Context::new(&args.common)?;
     match args.command {
         Command::Home(args) => home::run(&args, &context),
+        Command::Robustness(args) => robustness::run(&args, &context),
         Command::Render(args) => render::run(&args, &context),
         Command::World(args) => world::run(&args, &context),
     }

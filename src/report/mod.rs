@@ -7,6 +7,7 @@ mod folder;
 pub mod image;
 pub mod map;
 mod path_plot;
+pub mod robustness;
 pub mod run;
 pub mod seeds;
 pub mod text;

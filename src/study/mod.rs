@@ -1,4 +1,5 @@
 //! Studies: many episodes, and what they say together.
 
+pub mod robustness;
 pub mod seeds;
 pub mod statistics;
