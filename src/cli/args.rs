@@ -55,6 +55,9 @@ pub enum Command {
     /// Success against conditions that worsen one at a time, as a table and a picture
     #[command(after_help = EXIT_CODES)]
     Robustness(Box<RobustnessArgs>),
+    /// Cramer-Rao bound of range, bearing and heading along a path, and the filter's errors beside it
+    #[command(after_help = EXIT_CODES)]
+    Bound(BoundArgs),
     /// Render one panorama with range and instance ids
     #[command(after_help = EXIT_CODES)]
     Render(RenderArgs),
@@ -148,6 +151,32 @@ pub struct RobustnessArgs {
     /// Folder for the results [default: results/runs/robustness-WORLD-SEEDS]
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
+}
+
+/// Arguments of `bound`.
+#[derive(Debug, clap::Args)]
+pub struct BoundArgs {
+    /// World file, or the name of a built-in world
+    #[arg(default_value = "lab")]
+    pub world: String,
+    /// Runs of the filter along the path: one a seed from A to B, both included
+    #[arg(long, value_name = "A..B", default_value = "1..200", value_parser = seeds)]
+    pub seeds: RangeInclusive<u64>,
+    /// Seed of the run whose path is taken
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub path_seed: u64,
+    /// Start of the path: `random`, the name of one of the world's starts, or a pose x,y,heading_deg
+    #[arg(long, default_value = "random", allow_hyphen_values = true, value_parser = start)]
+    pub start: Start,
+    /// Standard deviation of bearings, degrees [default: 0.3]
+    #[arg(long, value_name = "DEG", allow_negative_numbers = true, value_parser = positive)]
+    pub noise_deg: Option<f64>,
+    /// Noise of odometry as a share of speed and yaw rate, in each step anew [default: 0.04]
+    #[arg(long, value_name = "SHARE", allow_negative_numbers = true, value_parser = share)]
+    pub noise_odometry: Option<f64>,
+    /// Time between rows of the table, s; `--json` has all steps
+    #[arg(long, value_name = "S", default_value = "0.5", allow_negative_numbers = true, value_parser = positive)]
+    pub every_s: f64,
 }
 
 /// Arguments of `render`.

@@ -4,6 +4,7 @@
 //! into an exit code.
 
 pub mod args;
+mod bound;
 mod context;
 mod home;
 mod render;
@@ -30,6 +31,7 @@ pub fn run(args: Args) -> Result<Verdict> {
     match args.command {
         Command::Home(args) => home::run(&args, &context),
         Command::Robustness(args) => robustness::run(&args, &context),
+        Command::Bound(args) => bound::run(&args, &context),
         Command::Render(args) => render::run(&args, &context),
         Command::World(args) => world::run(&args, &context),
     }

@@ -18,4 +18,4 @@ pub use record::{Outcome, Pictures, Record, Step, Timing};
 pub use run::{Parts, Progress, run};
 pub use sensor::Sensor;
 pub use setup::{Bearings, Bench, PlantKind, Setup, Start};
-pub use summary::{EstimateErrors, Landmarks, PoseRecord, SetupRecord, Summary};
+pub use summary::{BeliefError, EstimateErrors, Landmarks, PoseRecord, SetupRecord, Summary};

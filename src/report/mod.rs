@@ -3,6 +3,7 @@
 //! Reports know results, not how they came about. All files go through an [`OutputFolder`], which writes each of them whole or
 //! not at all and refuses to touch a folder that holds anything else.
 
+pub mod bound;
 mod folder;
 pub mod image;
 pub mod map;

@@ -1,5 +1,6 @@
 //! Studies: many episodes, and what they say together.
 
+pub mod bound;
 pub mod robustness;
 pub mod seeds;
 pub mod statistics;
