@@ -240,6 +240,31 @@ fn a_batch_counts_its_runs() {
 }
 
 #[test]
+fn a_robustness_study_is_the_same_on_any_number_of_threads() {
+    let folder = tempfile::tempdir().unwrap();
+    let study = |threads: &str, more: &[&str]| {
+        let common = ["robustness", LAB, "--bearings", "ideal", "--time-limit-s", "5", "--seeds", "1..3", "--out", "study"];
+        run(folder.path(), &[&common, &["--threads", threads][..], more].concat())
+    };
+    let files = |threads: &str| {
+        assert_done(&study(threads, &["--axis", "noise,hidden"]));
+        ["README.md", "robustness.csv", "robustness.svg"].map(|name| {
+            let text = std::fs::read_to_string(folder.path().join("study").join(name)).unwrap();
+            assert!(!text.contains("--threads"), "what does not matter is not told");
+            text
+        })
+    };
+    let first = files("1");
+    assert_eq!(first[1].lines().count(), 1 + 8 + 6);
+    assert!(first[0].contains("--seeds 1..3 --axis hidden,noise --bearings ideal"), "{}", first[0]);
+    assert_eq!(first, files("2"));
+
+    assert_fails(&study("1", &["--axis", "weather"]), 2, &["--axis", "friction"]);
+    assert_fails(&study("1", &["--size", "64x32"]), 2, &["--bearings rendered"]);
+    assert_fails(&run(folder.path(), &["robustness", LAB, "--seeds", "3..1"]), 2, &["--seeds"]);
+}
+
+#[test]
 fn a_panorama_comes_with_its_truth() {
     let folder = tempfile::tempdir().unwrap();
     let output =

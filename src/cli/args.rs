@@ -9,6 +9,7 @@ use wayhome::episode::method::{LawKind, MethodKind};
 use wayhome::episode::{Bearings, PlantKind, Start};
 use wayhome::geometry::Pose;
 use wayhome::render::RendererChoice;
+use wayhome::study::robustness::Axis;
 
 /// Shown under every `--help`.
 const EXIT_CODES: &str = "Exit codes:
@@ -69,6 +70,12 @@ pub enum Command {
     Drive(DriveArgs),
     /// Hold the physics against its closed forms: a page of charts, and the slip map
     PhysicsReport(PhysicsReportArgs),
+    /// Success against conditions that worsen one at a time, as a table and a picture
+    #[command(after_help = EXIT_CODES)]
+    Robustness(Box<RobustnessArgs>),
+    /// Cramer-Rao bound of range, bearing and heading along a path, and the filter's errors beside it
+    #[command(after_help = EXIT_CODES)]
+    Bound(BoundArgs),
     /// Render one panorama with range and instance ids
     #[command(after_help = EXIT_CODES)]
     Render(RenderArgs),
@@ -148,12 +155,73 @@ pub struct DriveArgs {
     pub out: Option<PathBuf>,
 }
 
+/// Arguments of `robustness`.
+#[derive(Debug, clap::Args)]
+pub struct RobustnessArgs {
+    /// World file, or the name of a built-in world
+    #[arg(default_value = "lab")]
+    pub world: String,
+    /// Run all seeds from A to B, both included, at every level
+    #[arg(long, value_name = "A..B", default_value = "1..40", value_parser = seeds)]
+    pub seeds: RangeInclusive<u64>,
+    /// What gets worse; several are separated by commas [default: all]
+    #[arg(long, value_name = "AXIS", value_delimiter = ',', value_parser = choice(AXES))]
+    pub axis: Vec<Axis>,
+    /// Where bearings come from, before they are made worse
+    #[arg(long, default_value = "rendered", value_parser = choice(BEARINGS))]
+    pub bearings: Bearings,
+    /// Homing method
+    #[arg(long, default_value = "anchored-ekf", value_parser = choice(METHODS))]
+    pub method: MethodKind,
+    /// Steering law of the methods that estimate where home is
+    #[arg(long, default_value = "proportional", value_parser = choice(LAWS))]
+    pub controller: LawKind,
+    /// What renders
+    #[arg(long, default_value = "auto", value_parser = choice(RENDERERS))]
+    pub renderer: RendererChoice,
+    /// Columns and rows of the panorama, 16x8 to 16384x4096 [default: the world's]
+    #[arg(long, value_name = "WxH", value_parser = size)]
+    pub size: Option<(u32, u32)>,
+    /// Time limit, s [default: the world's]
+    #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = positive)]
+    pub time_limit_s: Option<f64>,
+    /// Folder for the results [default: results/runs/robustness-WORLD-SEEDS]
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+}
+
 /// Arguments of `physics-report`.
 #[derive(Debug, clap::Args)]
 pub struct PhysicsReportArgs {
     /// Folder for the page; trajectories of another engine that lie there are shown too
     #[arg(long, value_name = "DIR", default_value = "results/physics")]
     pub out: PathBuf,
+}
+
+/// Arguments of `bound`.
+#[derive(Debug, clap::Args)]
+pub struct BoundArgs {
+    /// World file, or the name of a built-in world
+    #[arg(default_value = "lab")]
+    pub world: String,
+    /// Runs of the filter along the path: one a seed from A to B, both included
+    #[arg(long, value_name = "A..B", default_value = "1..200", value_parser = seeds)]
+    pub seeds: RangeInclusive<u64>,
+    /// Seed of the run whose path is taken
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub path_seed: u64,
+    /// Start of the path: `random`, the name of one of the world's starts, or a pose x,y,heading_deg
+    #[arg(long, default_value = "random", allow_hyphen_values = true, value_parser = start)]
+    pub start: Start,
+    /// Standard deviation of bearings, degrees [default: 0.3]
+    #[arg(long, value_name = "DEG", allow_negative_numbers = true, value_parser = positive)]
+    pub noise_deg: Option<f64>,
+    /// Noise of odometry as a share of speed and yaw rate, in each step anew [default: 0.04]
+    #[arg(long, value_name = "SHARE", allow_negative_numbers = true, value_parser = share)]
+    pub noise_odometry: Option<f64>,
+    /// Time between rows of the table, s; `--json` has all steps
+    #[arg(long, value_name = "S", default_value = "0.5", allow_negative_numbers = true, value_parser = positive)]
+    pub every_s: f64,
 }
 
 /// Arguments of `render`.
@@ -233,6 +301,13 @@ const RENDERERS: &[Choice<RendererChoice>] = &[
     (RendererChoice::Cpu, "cpu", "The CPU"),
 ];
 
+const AXES: &[Choice<Axis>] = &[
+    (Axis::Hidden, "hidden", "Share of the home landmarks that are never seen on the way, 0 to 70 %"),
+    (Axis::Friction, "friction", "Friction of the floor, 0.8 to 0.1"),
+    (Axis::FalseMatches, "false-matches", "Share of bearings that are false matches, 0 to 40 %"),
+    (Axis::Noise, "noise", "Noise added to bearings, 0.05 to 2 degrees"),
+];
+
 /// Reads one of `choices` by its name.
 fn choice<T: Copy + Send + Sync + 'static>(choices: &'static [Choice<T>]) -> impl TypedValueParser<Value = T> {
     let names = choices.iter().map(|(_, name, help)| PossibleValue::new(*name).help(*help));
@@ -240,9 +315,29 @@ fn choice<T: Copy + Send + Sync + 'static>(choices: &'static [Choice<T>]) -> imp
         .try_map(|given| choices.iter().find(|(_, name, _)| *name == given).map(|(value, ..)| *value).ok_or("unknown name"))
 }
 
+/// What the command line calls one of `choices`.
+fn name_of<T: PartialEq>(choices: &[Choice<T>], wanted: &T) -> &'static str {
+    choices.iter().find(|(value, ..)| value == wanted).map_or("", |(_, name, _)| name)
+}
+
 /// What `--bearings` calls a sensor.
 pub fn bearings_name(bearings: Bearings) -> &'static str {
-    BEARINGS.iter().find(|(value, ..)| *value == bearings).map_or("", |(_, name, _)| name)
+    name_of(BEARINGS, &bearings)
+}
+
+/// What `--method` calls a method.
+pub fn method_name(method: MethodKind) -> &'static str {
+    name_of(METHODS, &method)
+}
+
+/// What `--controller` calls a law.
+pub fn law_name(law: LawKind) -> &'static str {
+    name_of(LAWS, &law)
+}
+
+/// What `--renderer` calls a renderer.
+pub fn renderer_name(renderer: RendererChoice) -> &'static str {
+    name_of(RENDERERS, &renderer)
 }
 
 /// A finite number.
@@ -327,6 +422,8 @@ mod tests {
         check(BEARINGS);
         check(METHODS);
         check(LAWS);
+        check(AXES);
+        assert!(AXES.iter().all(|(axis, name, _)| axis.name() == *name));
     }
 
     #[test]

@@ -108,11 +108,12 @@ fn setup(args: &HomeArgs) -> Result<Setup, Error> {
         start: args.start.clone(),
         initial_estimate: args.initial_estimate,
         time_limit_s: args.time_limit_s,
+        ..Setup::default()
     })
 }
 
 /// Refuses a flag that would do nothing with the sensor that was chosen.
-fn needs_bearings(given: bool, flag: &str, found: Bearings, needed: Bearings) -> Result<(), Error> {
+pub fn needs_bearings(given: bool, flag: &str, found: Bearings, needed: Bearings) -> Result<(), Error> {
     if !given || found == needed {
         return Ok(());
     }

@@ -4,11 +4,13 @@
 //! into an exit code.
 
 pub mod args;
+mod bound;
 mod context;
 mod drive;
 mod home;
 mod physics_report;
 mod render;
+mod robustness;
 mod world;
 
 use anyhow::Result;
@@ -32,6 +34,8 @@ pub fn run(args: Args) -> Result<Verdict> {
         Command::Drive(args) => drive::run(&args, &context),
         Command::Home(args) => home::run(&args, &context),
         Command::PhysicsReport(args) => physics_report::run(&args, &context),
+        Command::Robustness(args) => robustness::run(&args, &context),
+        Command::Bound(args) => bound::run(&args, &context),
         Command::Render(args) => render::run(&args, &context),
         Command::World(args) => world::run(&args, &context),
     }

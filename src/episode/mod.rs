@@ -21,4 +21,4 @@ pub use record::{Outcome, Pictures, Record, Step, Timing};
 pub use run::{Parts, Progress, run};
 pub use sensor::Sensor;
 pub use setup::{Bearings, Bench, PlantKind, Setup, Start};
-pub use summary::{CollisionRecord, EstimateErrors, Landmarks, PoseRecord, SetupRecord, Summary};
+pub use summary::{BeliefError, CollisionRecord, EstimateErrors, Landmarks, PoseRecord, SetupRecord, Summary};

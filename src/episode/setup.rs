@@ -8,10 +8,10 @@ use serde::Serialize;
 use super::method::{self, LawKind, MethodKind};
 use super::record::Record;
 use super::run::{Parts, Progress, run};
-use super::sensor::{IdealSensor, Noise, NoisySensor, RenderedSensor, Sensor};
+use super::sensor::{Degradation, DegradedSensor, IdealSensor, Noise, NoisySensor, RenderedSensor, Sensor};
 use crate::error::{Error, Result};
 use crate::geometry::Pose;
-use crate::observation::{Briefing, RobotSheet, TaskSheet};
+use crate::observation::{Briefing, HomeSnapshot, RobotSheet, TaskSheet};
 use crate::panorama::Projection;
 use crate::physics::{Plant, RapierPlant, UnicyclePlant};
 use crate::random::Seed;
@@ -69,6 +69,8 @@ pub struct Setup {
     pub size_px: Option<(u32, u32)>,
     /// Faults of [`Bearings::Noisy`].
     pub noise: Noise,
+    /// What is done to the bearings of any sensor on top of that.
+    pub degradation: Degradation,
     /// Where runs start.
     pub start: Start,
     /// Pose in the home frame that a method starts from which wants one.
@@ -87,6 +89,7 @@ impl Default for Setup {
             renderer: RendererChoice::Auto,
             size_px: None,
             noise: Noise::default(),
+            degradation: Degradation::default(),
             start: Start::Random,
             initial_estimate: None,
             time_limit_s: None,
@@ -106,6 +109,12 @@ impl Setup {
     #[must_use]
     pub fn projection(&self, world: &World) -> Projection {
         self.size_px.map_or_else(|| world.projection(), |(width, height)| world.projection_of_size(width, height))
+    }
+
+    /// What a method is told before a run.
+    #[must_use]
+    pub fn briefing(&self, world: &World, home: HomeSnapshot) -> Briefing {
+        Briefing { home, robot: robot_sheet(world), task: task_sheet(&self.task(world)) }
     }
 
     /// The start pose in the room of the run with `seed`, checked to be free.
@@ -193,8 +202,11 @@ impl<'a> Bench<'a> {
             }
             None => Box::new(ideal()),
         };
+        if !setup.degradation.is_none() {
+            sensor = Box::new(DegradedSensor::new(sensor, setup.degradation, seed)?);
+        }
         let task = setup.task(world);
-        let briefing = Briefing { home: sensor.home().clone(), robot: robot_sheet(world), task: task_sheet(&task) };
+        let briefing = setup.briefing(world, sensor.home().clone());
         let mut method = method::build(setup.method, setup.law, briefing, setup.initial_estimate)?;
         let parts = Parts { plant: plant.as_mut(), sensor: sensor.as_mut(), method: method.as_mut() };
         run(parts, world.home, &task, watch)

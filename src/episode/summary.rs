@@ -251,16 +251,22 @@ impl EstimateErrors {
 }
 
 /// One belief against the truth.
-struct BeliefError {
-    range_m: f64,
-    bearing_rad: f64,
-    heading_rad: f64,
-    nees: Option<f64>,
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BeliefError {
+    /// Estimated minus true range to home, m.
+    pub range_m: f64,
+    /// Estimated minus true bearing from home, rad.
+    pub bearing_rad: f64,
+    /// Estimated minus true heading, rad.
+    pub heading_rad: f64,
+    /// Normalised estimation error squared of (x, y, heading); `None` where the covariance is not regular.
+    pub nees: Option<f64>,
 }
 
 impl BeliefError {
     /// `truth` is the true pose in the home frame.
-    fn new(estimate: &Estimate, truth: &Pose) -> Self {
+    #[must_use]
+    pub fn new(estimate: &Estimate, truth: &Pose) -> Self {
         let heading_rad = wrap(estimate.pose.heading - truth.heading);
         let error = Vector3::new(estimate.pose.x - truth.x, estimate.pose.y - truth.y, heading_rad);
         Self {

@@ -3,6 +3,7 @@
 //! Reports know results, not how they came about. All files go through an [`OutputFolder`], which writes each of them whole or
 //! not at all and refuses to touch a folder that holds anything else.
 
+pub mod bound;
 pub mod chart;
 pub mod drive;
 mod folder;
@@ -10,6 +11,7 @@ pub mod image;
 pub mod map;
 mod path_plot;
 pub mod physics;
+pub mod robustness;
 pub mod run;
 pub mod seeds;
 pub mod text;

@@ -2,13 +2,16 @@
 //!
 //! A sensor belongs to the simulator, so it sees the true poses; what it gives to the method are bearings only. Three kinds:
 //! [`RenderedSensor`] looks through the camera and the feature extractor, [`IdealSensor`] takes the bearings of the landmark
-//! bodies from geometry, and [`NoisySensor`] spoils those with noise, drop-outs and false matches.
+//! bodies from geometry, and [`NoisySensor`] spoils those with noise, drop-outs and false matches. A [`DegradedSensor`] makes any
+//! of them worse, for studies of robustness.
 
+mod degraded;
 mod ideal;
 mod noisy;
 mod rendered;
 mod sight;
 
+pub use degraded::{Degradation, DegradedSensor};
 pub use ideal::IdealSensor;
 pub use noisy::{Noise, NoisySensor};
 pub use rendered::RenderedSensor;

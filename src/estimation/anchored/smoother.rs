@@ -120,6 +120,13 @@ impl Stretch<'_> {
         })
     }
 
+    /// Covariance of (last pose, landmarks) by the information at given poses and landmarks. At the true ones, and without heavy
+    /// tails, it is the Cramer-Rao bound. `None` where the information is singular.
+    #[must_use]
+    pub fn covariance_at(&self, at: &Iterate) -> Option<DMatrix<f64>> {
+        Some(self.step(at)?.0.cholesky()?.inverse())
+    }
+
     /// Squared normalised residual of one sighting.
     #[must_use]
     pub fn residual_squared(at: &Iterate, frame: usize, s: &Sighting) -> f64 {

@@ -1,0 +1,253 @@
+//! Any sensor, made worse on purpose.
+
+use std::collections::BTreeMap;
+use std::f64::consts::{PI, TAU};
+
+use rand::RngExt;
+
+use super::{Sensor, SensorTiming};
+use crate::error::{Error, Result};
+use crate::geometry::{Pose, wrap};
+use crate::observation::{Bearing, HomeSnapshot, LandmarkId};
+use crate::panorama::Panorama;
+use crate::random::{Seed, Stream, standard_normal};
+use crate::render::RendererInfo;
+
+/// What is done to the bearings of a sensor, on top of the faults that they have anyway.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Degradation {
+    /// Share of the home snapshot's landmarks that are never seen on the way.
+    pub hidden: f64,
+    /// Share of bearings that are given the azimuth of another landmark, or one out of nowhere.
+    pub false_match: f64,
+    /// Standard deviation of the normal noise that is added to each bearing, at home too, rad. The sensor knows of it: the
+    /// standard deviations that it states grow accordingly.
+    pub noise_sd_rad: f64,
+}
+
+impl Degradation {
+    /// Whether nothing is done.
+    #[must_use]
+    pub fn is_none(&self) -> bool {
+        *self == Self::default()
+    }
+
+    /// Checks that the shares are shares and that the noise is a standard deviation.
+    ///
+    /// # Errors
+    /// When a value is out of its range.
+    pub fn check(&self) -> Result<()> {
+        let invalid = |what: &str, found: f64, allowed: &str| {
+            Err(Error::Invalid { what: what.into(), found: found.to_string(), allowed: allowed.into() })
+        };
+        for (what, share) in [("share of hidden landmarks", self.hidden), ("share of false matches", self.false_match)] {
+            if !(0.0..=1.0).contains(&share) {
+                return invalid(what, share, "0 to 1");
+            }
+        }
+        if !(self.noise_sd_rad >= 0.0 && self.noise_sd_rad.is_finite()) {
+            return invalid("added bearing noise (rad)", self.noise_sd_rad, "0 or greater");
+        }
+        Ok(())
+    }
+}
+
+/// A sensor whose bearings are hidden, confused and blurred.
+///
+/// Which landmarks are hidden is drawn once a run: with the same seed, a greater share hides the same ones and more. False
+/// matches and noise are drawn anew for each bearing.
+pub struct DegradedSensor<'a> {
+    sensor: Box<dyn Sensor + 'a>,
+    home: HomeSnapshot,
+    degradation: Degradation,
+    seed: Seed,
+    /// Landmarks whose key is not above this are hidden.
+    hidden_up_to: f64,
+    hidden: BTreeMap<LandmarkId, bool>,
+    false_match: Stream,
+    normal: Stream,
+}
+
+impl<'a> DegradedSensor<'a> {
+    /// Makes `sensor` worse.
+    ///
+    /// # Errors
+    /// When a value of the degradation is out of its range.
+    pub fn new(sensor: Box<dyn Sensor + 'a>, degradation: Degradation, seed: Seed) -> Result<Self> {
+        degradation.check()?;
+        let seed = seed.derive("degraded");
+        let mut home = sensor.home().clone();
+        let mut at_home = seed.stream("noise-home");
+        for bearing in &mut home.bearings {
+            *bearing = blurred(*bearing, degradation.noise_sd_rad, standard_normal(&mut at_home));
+        }
+        let mut keys: Vec<f64> = home.bearings.iter().map(|b| hiding_key(seed, b.id)).collect();
+        keys.sort_by(f64::total_cmp);
+        let count = libm::round(degradation.hidden * keys.len() as f64) as usize;
+        let hidden_up_to = count.checked_sub(1).and_then(|last| keys.get(last)).copied().unwrap_or(-1.0);
+        Ok(Self {
+            sensor,
+            home,
+            degradation,
+            seed,
+            hidden_up_to,
+            hidden: BTreeMap::new(),
+            false_match: seed.stream("false-match"),
+            normal: seed.stream("noise"),
+        })
+    }
+
+    fn is_hidden(&mut self, id: LandmarkId) -> bool {
+        let (seed, up_to) = (self.seed, self.hidden_up_to);
+        *self.hidden.entry(id).or_insert_with(|| hiding_key(seed, id) <= up_to)
+    }
+}
+
+/// A number in [0, 1) that is the landmark's own: those with the smallest ones are hidden. It is there for landmarks that are
+/// first met on the way, too.
+fn hiding_key(seed: Seed, id: LandmarkId) -> f64 {
+    seed.stream(&format!("hidden-{}", id.0)).random()
+}
+
+/// The bearing moved by `deviations` standard deviations of noise that is independent of what it has already.
+fn blurred(bearing: Bearing, sd_rad: f64, deviations: f64) -> Bearing {
+    if sd_rad == 0.0 {
+        return bearing;
+    }
+    Bearing {
+        azimuth_rad: wrap(bearing.azimuth_rad + sd_rad * deviations),
+        sd_rad: (bearing.sd_rad * bearing.sd_rad + sd_rad * sd_rad).sqrt(),
+        ..bearing
+    }
+}
+
+impl Sensor for DegradedSensor<'_> {
+    fn home(&self) -> &HomeSnapshot {
+        &self.home
+    }
+
+    fn observe(&mut self, truth: Pose, bodies: &[Pose]) -> Result<Vec<Bearing>> {
+        let mut seen = self.sensor.observe(truth, bodies)?;
+        seen.retain(|b| !self.is_hidden(b.id));
+        let others: Vec<f64> = seen.iter().map(|b| b.azimuth_rad).collect();
+        for (k, bearing) in seen.iter_mut().enumerate() {
+            // All numbers are drawn whatever comes of them, so that a greater share changes more bearings and not others.
+            let [is_false, kind, which] = std::array::from_fn(|_| self.false_match.random::<f64>());
+            let deviations = standard_normal(&mut self.normal);
+            if is_false < self.degradation.false_match {
+                // A wrong match is most often with something that looks alike, which is another landmark; else with anything.
+                let another = kind < 0.5 && others.len() > 1;
+                bearing.azimuth_rad = if another {
+                    let step = 1 + (which * (others.len() - 1) as f64) as usize;
+                    others[(k + step) % others.len()]
+                } else {
+                    PI - TAU * which
+                };
+            }
+            *bearing = blurred(*bearing, self.degradation.noise_sd_rad, deviations);
+        }
+        Ok(seen)
+    }
+
+    fn home_panorama(&self) -> Option<&Panorama> {
+        self.sensor.home_panorama()
+    }
+
+    fn panorama(&self) -> Option<&Panorama> {
+        self.sensor.panorama()
+    }
+
+    fn renderer(&self) -> Option<&RendererInfo> {
+        self.sensor.renderer()
+    }
+
+    fn timing(&self) -> SensorTiming {
+        self.sensor.timing()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Sees 200 landmarks all round, from anywhere, exactly.
+    struct Carousel(HomeSnapshot);
+
+    impl Carousel {
+        fn new() -> Self {
+            let azimuth = |k: u32| wrap(TAU * f64::from(k) / 200.0);
+            let bearing = |k: u32| Bearing { id: LandmarkId(k), azimuth_rad: azimuth(k), sd_rad: 0.003 };
+            Self(HomeSnapshot { bearings: (0..200).map(bearing).collect() })
+        }
+    }
+
+    impl Sensor for Carousel {
+        fn home(&self) -> &HomeSnapshot {
+            &self.0
+        }
+        fn observe(&mut self, _: Pose, _: &[Pose]) -> Result<Vec<Bearing>> {
+            Ok(self.0.bearings.clone())
+        }
+    }
+
+    fn sensor(degradation: Degradation, seed: u64) -> DegradedSensor<'static> {
+        DegradedSensor::new(Box::new(Carousel::new()), degradation, Seed(seed)).unwrap()
+    }
+
+    fn look(sensor: &mut DegradedSensor<'_>) -> Vec<Bearing> {
+        sensor.observe(Pose::IDENTITY, &[]).unwrap()
+    }
+
+    fn ids(seen: &[Bearing]) -> Vec<u32> {
+        seen.iter().map(|b| b.id.0).collect()
+    }
+
+    #[test]
+    fn the_same_landmarks_stay_hidden_and_more_of_them_with_a_greater_share() {
+        let mut less = sensor(Degradation { hidden: 0.3, ..Degradation::default() }, 1);
+        let mut more = sensor(Degradation { hidden: 0.7, ..Degradation::default() }, 1);
+        let (first, few) = (look(&mut less), look(&mut more));
+        assert_eq!((first.len(), few.len()), (140, 60));
+        assert_eq!(first, look(&mut less));
+        assert!(few.iter().all(|b| first.contains(b)));
+        assert_eq!(less.home(), &Carousel::new().0, "home was seen before");
+        let another = look(&mut sensor(Degradation { hidden: 0.3, ..Degradation::default() }, 2));
+        assert_ne!(ids(&another), ids(&first));
+        assert_eq!(look(&mut sensor(Degradation { hidden: 1.0, ..Degradation::default() }, 1)), []);
+    }
+
+    #[test]
+    fn faults_come_as_often_and_as_large_as_asked_for() {
+        let truth = Carousel::new().0.bearings;
+        let noise_sd_rad = 0.004;
+        let mut worse = sensor(Degradation { hidden: 0.0, false_match: 0.25, noise_sd_rad }, 3);
+        let (mut wrong, mut square, mut steps) = (0.0, 0.0, 0.0);
+        for _ in 0..200 {
+            for (seen, true_one) in look(&mut worse).iter().zip(&truth) {
+                assert!((seen.sd_rad - 0.005).abs() < 1e-12, "0.003 and 0.004 make 0.005");
+                let error = wrap(seen.azimuth_rad - true_one.azimuth_rad);
+                steps += 1.0;
+                if error.abs() > 5.0 * noise_sd_rad {
+                    wrong += 1.0;
+                } else {
+                    square += error * error;
+                }
+            }
+        }
+        // A direction out of nowhere may by chance be near the right one; so may a neighbour's not be: they are 31 mrad apart.
+        let by_chance = 0.25 * 0.5 * 10.0 * noise_sd_rad / TAU;
+        let share: f64 = wrong / steps + by_chance;
+        assert!((share - 0.25).abs() < 0.01, "{share}");
+        let sd: f64 = (square / (steps - wrong)).sqrt();
+        assert!((sd / noise_sd_rad - 1.0).abs() < 0.05, "{sd}");
+        assert!(worse.home().bearings.iter().zip(&truth).all(|(b, t)| b.azimuth_rad != t.azimuth_rad && b.sd_rad > 0.0049));
+    }
+
+    #[test]
+    fn nothing_asked_for_nothing_done() {
+        let mut same = sensor(Degradation::default(), 4);
+        assert_eq!(look(&mut same), Carousel::new().0.bearings);
+        assert!(Degradation { hidden: 1.1, ..Degradation::default() }.check().is_err());
+        assert!(Degradation { noise_sd_rad: f64::NAN, ..Degradation::default() }.check().is_err());
+    }
+}
