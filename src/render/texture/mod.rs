@@ -100,7 +100,8 @@ mod tests {
         let finest = &bands.texels[..64 * 64];
         assert!(finest.chunks(64).all(|line| line == &finest[..64]));
         assert!(finest[..64].iter().any(|t| *t != finest[0]));
-        assert_eq!(bake(&spec(TextureFamily::Plain), 6).texels, [0xff5a_7896]);
+        let plain = spec(TextureFamily::Plain);
+        assert_eq!(bake(&plain, log2_sizes(&[&plain])[0]).texels, [0xff5a_7896]);
     }
 
     #[test]
