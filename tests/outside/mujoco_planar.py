@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """The same drives in wayhome and in MuJoCo: trajectories side by side.
 
-    python3 -m venv /tmp/mujoco && /tmp/mujoco/bin/pip install mujoco==4.0.0
-    /tmp/mujoco/bin/python tests/outside/mujoco_planar.py
+    python3 -m venv .venv && .venv/bin/pip install mujoco==4.0.0
+    .venv/bin/python tests/outside/mujoco_planar.py
     target/release/wayhome physics-report --out results/physics
 
 writes results/physics/mujoco.csv; the report then shows it. Not part of CI: it needs MuJoCo, and the table only changes when
