@@ -124,7 +124,7 @@ fn trial(setting: &Setting, seed: u64) -> Trial {
     let mut arrived = false;
     while time < 90.0 {
         let bearings = see(&truth, &mut noise);
-        let decision = method.step(&Observation { time_s: time, odometry, bearings: &bearings });
+        let decision = method.step(&Observation { time_s: time, odometry, bearings: &bearings, compass_rad: None });
         if let Some(estimate) = &decision.estimate {
             assert!(estimate.pose.is_finite());
             errors.push(nees(estimate, &truth));

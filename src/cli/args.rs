@@ -119,6 +119,9 @@ pub struct HomeArgs {
     /// Pose in the home frame at which a filter starts that has to be given one (paper-ekf): x,y,heading_deg
     #[arg(long, value_name = "x,y,heading_deg", allow_hyphen_values = true, value_parser = pose)]
     pub initial_estimate: Option<Pose>,
+    /// Give the robot a compass with readings of this standard deviation, degrees; methods without an estimate use it
+    #[arg(long, value_name = "DEG", allow_negative_numbers = true, value_parser = not_negative)]
+    pub compass_deg: Option<f64>,
     /// Time limit, s [default: the world's]
     #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = positive)]
     pub time_limit_s: Option<f64>,
@@ -287,7 +290,10 @@ const BEARINGS: &[Choice<Bearings>] = &[
 const METHODS: &[Choice<MethodKind>] = &[
     (MethodKind::AnchoredEkf, "anchored-ekf", "Filter that starts from nothing and anchors home when it can"),
     (MethodKind::PaperEkf, "paper-ekf", "The paper's filter on three landmarks, started at a supposed pose"),
-    (MethodKind::Alv, "alv", "Average landmark vector without a compass; no estimate"),
+    (MethodKind::Alv, "alv", "Average landmark vector; no estimate"),
+    (MethodKind::TronDaniilidis, "tron-daniilidis", "Tron and Daniilidis' descent on bearings; no estimate"),
+    (MethodKind::Weber, "weber", "Weber's bearing vectors; no estimate"),
+    (MethodKind::Ibvs, "ibvs", "Visual servoing with one constant range; no estimate"),
 ];
 
 const LAWS: &[Choice<LawKind>] = &[

@@ -8,7 +8,7 @@ use serde::Serialize;
 use super::method::{self, LawKind, MethodKind};
 use super::record::Record;
 use super::run::{Parts, Progress, run};
-use super::sensor::{Degradation, DegradedSensor, IdealSensor, Noise, NoisySensor, RenderedSensor, Sensor};
+use super::sensor::{CompassSensor, Degradation, DegradedSensor, IdealSensor, Noise, NoisySensor, RenderedSensor, Sensor};
 use crate::error::{Error, Result};
 use crate::geometry::Pose;
 use crate::observation::{Briefing, HomeSnapshot, RobotSheet, TaskSheet};
@@ -71,6 +71,9 @@ pub struct Setup {
     pub noise: Noise,
     /// What is done to the bearings of any sensor on top of that.
     pub degradation: Degradation,
+    /// Standard deviation of the readings of the robot's compass, rad; `None` for a robot without one. Only methods that steer
+    /// by a homing vector read it.
+    pub compass_sd_rad: Option<f64>,
     /// Where runs start.
     pub start: Start,
     /// Pose in the home frame that a method starts from which wants one.
@@ -90,6 +93,7 @@ impl Default for Setup {
             size_px: None,
             noise: Noise::default(),
             degradation: Degradation::default(),
+            compass_sd_rad: None,
             start: Start::Random,
             initial_estimate: None,
             time_limit_s: None,
@@ -204,6 +208,9 @@ impl<'a> Bench<'a> {
         };
         if !setup.degradation.is_none() {
             sensor = Box::new(DegradedSensor::new(sensor, setup.degradation, seed)?);
+        }
+        if let Some(sd_rad) = setup.compass_sd_rad {
+            sensor = Box::new(CompassSensor::new(sensor, world.home, sd_rad, seed)?);
         }
         let task = setup.task(world);
         let briefing = setup.briefing(world, sensor.home().clone());
