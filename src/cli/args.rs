@@ -9,6 +9,7 @@ use wayhome::episode::method::{LawKind, MethodKind};
 use wayhome::episode::{Bearings, PlantKind, Start};
 use wayhome::geometry::Pose;
 use wayhome::render::RendererChoice;
+use wayhome::report::paper::Target;
 use wayhome::study::robustness::Axis;
 
 /// Shown under every `--help`.
@@ -70,6 +71,10 @@ pub enum Command {
     Drive(DriveArgs),
     /// Hold the physics against its closed forms: a page of charts, and the slip map
     PhysicsReport(PhysicsReportArgs),
+    /// Rebuild the paper's tables and figures beside the printed numbers, and audit its claims
+    Reproduce(super::reproduce::ReproduceArgs),
+    /// Where the paper's state can be told from bearings and motion: rank and condition over a room
+    Observability(super::observability::ObservabilityArgs),
     /// Success against conditions that worsen one at a time, as a table and a picture
     #[command(after_help = EXIT_CODES)]
     Robustness(Box<RobustnessArgs>),
@@ -274,7 +279,7 @@ pub enum WorldCommand {
 }
 
 /// A value of the library, what it is called here, and what `--help` says of it.
-type Choice<T> = (T, &'static str, &'static str);
+pub type Choice<T> = (T, &'static str, &'static str);
 
 const PLANTS: &[Choice<PlantKind>] = &[
     (PlantKind::Rapier, "rapier", "Wheels that slip, motors, encoders, collisions"),
@@ -314,15 +319,28 @@ const AXES: &[Choice<Axis>] = &[
     (Axis::Noise, "noise", "Noise added to bearings, 0.05 to 2 degrees"),
 ];
 
+/// What `reproduce` calls what it can; `None` is all of it.
+pub const TARGETS: &[Choice<Option<Target>>] = &[
+    (Some(Target::Table1), "table1", "Table I: errors with accurate bearings"),
+    (Some(Target::Fig3), "fig3", "Fig. 3: paths with accurate bearings"),
+    (Some(Target::Table2), "table2", "Table II: errors with bearings from images, the paper's own set"),
+    (Some(Target::Fig5), "fig5", "Fig. 5: paths on that set"),
+    (Some(Target::Fig7), "fig7", "Fig. 7: paths on Vardy's set"),
+    (Some(Target::Fig8), "fig8", "Fig. 8: time home beside other methods"),
+    (Some(Target::Observability), "observability", "Rank and condition of the matrix O"),
+    (Some(Target::Audit), "audit", "A row for each claim: what holds, from which start, under which noise"),
+    (None, "all", "All of these"),
+];
+
 /// Reads one of `choices` by its name.
-fn choice<T: Copy + Send + Sync + 'static>(choices: &'static [Choice<T>]) -> impl TypedValueParser<Value = T> {
+pub fn choice<T: Copy + Send + Sync + 'static>(choices: &'static [Choice<T>]) -> impl TypedValueParser<Value = T> {
     let names = choices.iter().map(|(_, name, help)| PossibleValue::new(*name).help(*help));
     PossibleValuesParser::new(names)
         .try_map(|given| choices.iter().find(|(_, name, _)| *name == given).map(|(value, ..)| *value).ok_or("unknown name"))
 }
 
 /// What the command line calls one of `choices`.
-fn name_of<T: PartialEq>(choices: &[Choice<T>], wanted: &T) -> &'static str {
+pub fn name_of<T: PartialEq>(choices: &[Choice<T>], wanted: &T) -> &'static str {
     choices.iter().find(|(value, ..)| value == wanted).map_or("", |(_, name, _)| name)
 }
 
@@ -347,11 +365,11 @@ pub fn renderer_name(renderer: RendererChoice) -> &'static str {
 }
 
 /// A finite number.
-fn number(text: &str) -> Result<f64, String> {
+pub fn number(text: &str) -> Result<f64, String> {
     text.trim().parse().ok().filter(|v: &f64| v.is_finite()).ok_or_else(|| format!("`{text}` is not a finite number"))
 }
 
-fn positive(text: &str) -> Result<f64, String> {
+pub fn positive(text: &str) -> Result<f64, String> {
     number(text).and_then(|v| if v > 0.0 { Ok(v) } else { Err("must be greater than 0".into()) })
 }
 

@@ -8,8 +8,10 @@ mod bound;
 mod context;
 mod drive;
 mod home;
+mod observability;
 mod physics_report;
 mod render;
+mod reproduce;
 mod robustness;
 mod world;
 
@@ -36,6 +38,8 @@ pub fn run(args: Args) -> Result<Verdict> {
         Command::PhysicsReport(args) => physics_report::run(&args, &context),
         Command::Robustness(args) => robustness::run(&args, &context),
         Command::Bound(args) => bound::run(&args, &context),
+        Command::Observability(args) => observability::run(&args, &context),
+        Command::Reproduce(args) => reproduce::run(&args, &context),
         Command::Render(args) => render::run(&args, &context),
         Command::World(args) => world::run(&args, &context),
     }

@@ -60,13 +60,7 @@ pub enum Prediction {
 
 impl Default for PaperSettings {
     fn default() -> Self {
-        Self {
-            process: 0.01,
-            measurement: 0.1,
-            initial: 1.0,
-            transition: Transition::Discrete,
-            prediction: Prediction::Ode,
-        }
+        Self { process: 0.01, measurement: 0.1, initial: 1.0, transition: Transition::Discrete, prediction: Prediction::Ode }
     }
 }
 

@@ -89,9 +89,11 @@ impl PanoramaSet {
             allowed: format!("{} rows and {} columns from (0, 0)", self.rows, self.columns),
         })?;
         let broken = |source| Error::Image { path: path.clone(), source };
-        let mut reader = ImageReader::open(path)
-            .and_then(ImageReader::with_guessed_format)
-            .map_err(|source| Error::Io { action: "read", path: path.clone(), source })?;
+        let mut reader = ImageReader::open(path).and_then(ImageReader::with_guessed_format).map_err(|source| Error::Io {
+            action: "read",
+            path: path.clone(),
+            source,
+        })?;
         let mut limits = image::Limits::default();
         limits.max_image_width = Some(MOST_PX);
         limits.max_image_height = Some(MOST_PX);

@@ -9,6 +9,7 @@ pub mod drive;
 mod folder;
 pub mod image;
 pub mod map;
+pub mod paper;
 mod path_plot;
 pub mod physics;
 pub mod robustness;

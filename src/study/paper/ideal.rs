@@ -1,6 +1,6 @@
 //! Section IV-A: three point landmarks, accurate bearings, four starts, both laws. Table I and Fig. 3.
 
-use super::trial::{PaperPilot, Terms, Track, drive};
+use super::trial::{PaperPilot, Terms, Track, anchored, drive};
 use super::{BETA, LAWS, STARTS};
 use crate::control::Law;
 use crate::control::printed::PrintedLaw;
@@ -57,8 +57,7 @@ impl Ideal {
     /// When the world lacks one of the starts, or has fewer than three landmarks.
     pub fn of(world: &World) -> Result<Self> {
         let home = world.home;
-        let landmarks: Vec<_> =
-            world.landmarks().iter().map(|body| home.inverse_transform(body.pose.position())).collect();
+        let landmarks: Vec<_> = world.landmarks().iter().map(|body| home.inverse_transform(body.pose.position())).collect();
         if landmarks.len() < 3 {
             return Err(Error::Invalid {
                 what: format!("landmarks of world `{}`", world.spec.name),
@@ -91,8 +90,7 @@ impl Ideal {
     /// One run of the paper's filter, started at `initial`.
     #[must_use]
     pub fn run(&self, law: Law, start: Pose, initial: Pose, twists: &Twists) -> Track {
-        let law =
-            PrintedLaw { law, speed_m_s: self.terms.speed_m_s, radius_m: self.terms.radius_m, beta: twists.beta };
+        let law = PrintedLaw { law, speed_m_s: self.terms.speed_m_s, radius_m: self.terms.radius_m, beta: twists.beta };
         let mut noise = twists.noise.map(|(sd_rad, seed)| (sd_rad, Seed(seed).stream("paper bearings")));
         let mut look = |pose: &Pose| {
             let mut seen = self.bearings(pose);
@@ -120,6 +118,23 @@ impl Ideal {
             })
         };
         LAWS.into_iter().flat_map(each).collect()
+    }
+
+    /// The anchored filter from all starts with both laws, told nothing.
+    ///
+    /// # Errors
+    /// When it cannot be built.
+    pub fn anchored(&self) -> Result<Vec<Run>> {
+        let home = HomeSnapshot { bearings: self.bearings(&Pose::IDENTITY) };
+        let mut runs = Vec::new();
+        for law in LAWS {
+            for &(name, start) in &self.starts {
+                let mut method = anchored(law, &self.terms, &home)?;
+                let track = drive(&self.terms, start, &mut |pose| self.bearings(pose), false, method.as_mut());
+                runs.push(Run { start: name, law, track });
+            }
+        }
+        Ok(runs)
     }
 
     /// Table I: the filter started at the true pose.

@@ -63,7 +63,9 @@ impl ImageSet {
     /// Settings that suit the size of its pictures.
     fn extractor(self) -> ExtractorSettings {
         match self {
-            Self::Paper => ExtractorSettings { octaves: 5, features: 1000, home_features: 1000, ..ExtractorSettings::default() },
+            Self::Paper => {
+                ExtractorSettings { octaves: 5, features: 1000, home_features: 1000, ..ExtractorSettings::default() }
+            }
             Self::Vardy => ExtractorSettings::default(),
         }
     }
@@ -76,6 +78,8 @@ pub struct ImageCase {
     pub set: ImageSet,
     /// Whether the panoramas are rendered; else they come from disk.
     pub rendered: bool,
+    /// The panorama at home.
+    pub home: Panorama,
     /// Its objects.
     pub field: ObjectField,
     /// The paper's starts, in the home frame.
@@ -92,7 +96,7 @@ impl ImageCase {
     pub fn new(set: ImageSet, folder: Option<&Path>) -> Result<Self> {
         let world = World::open(set.world_name())?;
         let grid = set.grid();
-        let field = match folder {
+        let (home, field) = match folder {
             Some(folder) => {
                 let files = PanoramaSet::open(folder, set.layout())?;
                 if files.shape() != (grid.rows, grid.columns) {
@@ -132,7 +136,7 @@ impl ImageCase {
             radius_m: task.arrival_radius_m,
             limit_s: task.time_limit_s,
         };
-        Ok(Self { set, rendered: folder.is_none(), field, starts: starts.collect::<Result<_>>()?, terms })
+        Ok(Self { set, rendered: folder.is_none(), home, field, starts: starts.collect::<Result<_>>()?, terms })
     }
 
     /// The paper's filter with its settings for images (M = I) but for those of `settings`, from all starts with both laws.

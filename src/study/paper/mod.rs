@@ -2,8 +2,10 @@
 //!
 //! Its simulations run here under its own constants ([`PrintedTable`] has its numbers), and under the conditions that it leaves
 //! unsaid. [`trial`] is one run as the paper simulates it; the other modules are its parts: [`ideal`] Table I and Fig. 3, [`images`]
-//! Table II, Fig. 5 and Fig. 7, `contest` Fig. 8, `claims` what else the paper says and what of it holds.
+//! Table II, Fig. 5 and Fig. 7, [`contest`] Fig. 8, [`claims`] what else the paper says and what of it holds.
 
+pub mod claims;
+pub mod contest;
 pub mod ideal;
 pub mod images;
 pub mod objects;

@@ -16,7 +16,7 @@ use crate::study::statistics::quantile;
 use crate::vision::{Extractor, ExtractorSettings, Match};
 
 /// Width of an object's strip, rad.
-const WIDTH_RAD: f64 = 12.0 * std::f64::consts::PI / 180.0;
+pub const WIDTH_RAD: f64 = 12.0 * std::f64::consts::PI / 180.0;
 /// Fewest matched features that make a detection.
 const LEAST_FEATURES: usize = 4;
 /// Largest miss of a feature in a detection, as a share of the strip's width.
@@ -64,11 +64,16 @@ pub struct ObjectField {
 }
 
 impl ObjectField {
-    /// Finds the objects of the panorama at home in the panoramas of all places. `load` is called from several threads.
+    /// Finds the objects of the panorama at home, which comes with them, in the panoramas of all places. `load` is called from several
+    /// threads.
     ///
     /// # Errors
     /// What `load` fails with, panoramas of different sizes, or too few objects.
-    pub fn extract(grid: Grid, settings: &ExtractorSettings, load: &(dyn Fn(Place) -> Result<Panorama> + Sync)) -> Result<Self> {
+    pub fn extract(
+        grid: Grid,
+        settings: &ExtractorSettings,
+        load: &(dyn Fn(Place) -> Result<Panorama> + Sync),
+    ) -> Result<(Panorama, Self)> {
         let home = load(grid.home)?;
         let projection = home.projection;
         let places: Vec<Place> = grid.places().collect();
@@ -85,10 +90,8 @@ impl ObjectField {
             extractor.observe(&panorama);
             Ok(extractor.matches().to_vec())
         };
-        let matches: Vec<Vec<Match>> = places
-            .par_iter()
-            .map_init(|| Extractor::new(settings.clone(), &home), observe)
-            .collect::<Result<_>>()?;
+        let matches: Vec<Vec<Match>> =
+            places.par_iter().map_init(|| Extractor::new(settings.clone(), &home), observe).collect::<Result<_>>()?;
         let width = f64::from(projection.width);
         let candidates: Vec<Object> = (0..(std::f64::consts::TAU / STEP_RAD).round() as usize)
             .map(|k| projection.column(k as f64 * STEP_RAD))
@@ -103,13 +106,14 @@ impl ObjectField {
             allowed: "at least three".into(),
         })?;
         let matches_mean = matches.iter().map(Vec::len).sum::<usize>() as f64 / places.len().max(1) as f64;
-        Ok(Self { grid, objects, size_px: [projection.width, projection.height], matches_mean })
+        Ok((home, Self { grid, objects, size_px: [projection.width, projection.height], matches_mean }))
     }
 
     /// The home snapshot of the first `count` objects.
     #[must_use]
     pub fn home(&self, count: usize, sd_rad: f64) -> HomeSnapshot {
-        let bearing = |(k, object): (usize, &Object)| Bearing { id: LandmarkId(k as u32), azimuth_rad: object.home_rad, sd_rad };
+        let bearing =
+            |(k, object): (usize, &Object)| Bearing { id: LandmarkId(k as u32), azimuth_rad: object.home_rad, sd_rad };
         HomeSnapshot { bearings: self.objects.iter().take(count).enumerate().map(bearing).collect() }
     }
 
@@ -156,8 +160,7 @@ fn detect(matches: &[Match], column: f64, width: f64) -> Option<f64> {
     }
     // Column now = anchor + stretch (column at home - middle); all relative to where the first feature is now.
     let anchor = inside[0].now_px.0;
-    let points: Vec<(f64, f64)> =
-        inside.iter().map(|m| (apart(m.home_px.0, column), apart(m.now_px.0, anchor))).collect();
+    let points: Vec<(f64, f64)> = inside.iter().map(|m| (apart(m.home_px.0, column), apart(m.now_px.0, anchor))).collect();
     let mut slopes = Vec::new();
     for (k, a) in points.iter().enumerate() {
         for b in &points[k + 1..] {
@@ -270,7 +273,8 @@ mod tests {
         };
         // Strip of 12 of 360 columns around column 1, which goes to column 355 at a stretch of 1.5, across the seam.
         let now = |home: f64| (355.0 + 1.5 * (home - 1.0)).rem_euclid(360.0);
-        let mut matches: Vec<Match> = [356.0, 358.5, 0.0, 2.0, 4.5, 6.0].iter().map(|h| at(*h, now(if *h > 180.0 { h - 360.0 } else { *h }))).collect();
+        let mut matches: Vec<Match> =
+            [356.0, 358.5, 0.0, 2.0, 4.5, 6.0].iter().map(|h| at(*h, now(if *h > 180.0 { h - 360.0 } else { *h }))).collect();
         matches.extend([at(3.0, 100.0), at(359.0, 40.0), at(90.0, 95.0)]); // six of eight agree
         let found = detect(&matches, 1.0, 360.0).unwrap();
         assert!((found - 355.0).abs() < 1e-9, "{found}");

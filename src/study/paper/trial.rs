@@ -1,10 +1,15 @@
 //! One run as the paper simulates it: a unicycle at constant speed, stopped when it is truly within Rc of home.
 
+use crate::control::Law;
 use crate::control::printed::PrintedLaw;
 use crate::control::vectors::{VectorLaw, align};
+use crate::episode::method::{self, LawKind, MethodKind};
+use crate::error::Result;
 use crate::estimation::paper::{PaperEkf, PaperSettings};
 use crate::geometry::{Pose, Twist, angle_of, sin_cos, wrap};
-use crate::observation::{Bearing, Decision, HomeSnapshot, LandmarkId, Method, Observation, Odometry, Status};
+use crate::observation::{
+    Bearing, Briefing, Decision, HomeSnapshot, LandmarkId, Method, Observation, Odometry, RobotSheet, Status, TaskSheet,
+};
 use crate::ode::{Tolerance, integrate};
 
 /// What a run is given beside its start: the paper's Ts, v, Rc, and when to give up.
@@ -55,6 +60,12 @@ impl Track {
         self.samples.last().filter(|_| self.home).map(|s| s.time_s)
     }
 
+    /// True distance to home at the end, m.
+    #[must_use]
+    pub fn final_distance_m(&self) -> f64 {
+        self.samples.last().map_or(f64::NAN, |s| s.truth.position().norm())
+    }
+
     /// Errors of the estimate by (17), over the instants after the start that have one.
     #[must_use]
     pub fn rmse(&self) -> Option<Rmse> {
@@ -75,14 +86,10 @@ impl Track {
 #[must_use]
 pub fn polar_errors(truth: &Pose, estimate: &Pose) -> [f64; 3] {
     let (t, e) = (truth.position(), estimate.position());
-    [
-        100.0 * (e.norm() - t.norm()),
-        wrap(angle_of(e) - angle_of(t)),
-        wrap(estimate.heading - truth.heading),
-    ]
+    [100.0 * (e.norm() - t.norm()), wrap(angle_of(e) - angle_of(t)), wrap(estimate.heading - truth.heading)]
 }
 
-/// Drives `method` from `start` (home frame). The truth is integrated by Dormand and Prince's method between sampling instants, the
+/// Drives `method` from `start` (home frame) until it is truly within Rc, stops by itself, or is out of time. The truth is integrated by Dormand and Prince's method between sampling instants, the
 /// odometry is the command itself. `compass` says whether the method is told the true heading.
 pub fn drive(terms: &Terms, start: Pose, eyes: &mut Eyes<'_>, compass: bool, method: &mut dyn Method) -> Track {
     let mut truth = start;
@@ -96,7 +103,8 @@ pub fn drive(terms: &Terms, start: Pose, eyes: &mut Eyes<'_>, compass: bool, met
         samples.push(Sample { time_s, truth, estimate: decision.estimate.map(|e| e.pose) });
         let home = truth.position().norm() <= terms.radius_m;
         let twist = decision.command;
-        if home || time_s >= terms.limit_s || !(twist.v.is_finite() && twist.omega.is_finite()) {
+        let over = decision.status != Status::Running || time_s >= terms.limit_s;
+        if home || over || !(twist.v.is_finite() && twist.omega.is_finite()) {
             let straight_s = (start.position().norm() - terms.radius_m) / terms.speed_m_s;
             return Track { samples, home, straight_s };
         }
@@ -157,6 +165,29 @@ impl Method for PaperPilot {
             nis: f64::NAN,
         }
     }
+}
+
+/// Limit of everyone's turn rate, rad/s: what the paper's proportional law asks for at most. With the paper's constants the nonlinear
+/// one asks for less.
+pub const TURN_LIMIT_RAD_S: f64 = std::f64::consts::PI;
+
+/// The anchored filter, told nothing, with its own controller: it slows down to turn and to stop, and stops when it is sure to be home.
+///
+/// # Errors
+/// When there are fewer than three landmarks.
+pub fn anchored(law: Law, terms: &Terms, home: &HomeSnapshot) -> Result<Box<dyn Method>> {
+    let law = match law {
+        Law::Proportional => LawKind::Proportional,
+        Law::Lyapunov => LawKind::Lyapunov,
+    };
+    let robot = RobotSheet {
+        track_m: 0.23,
+        max_speed_m_s: terms.speed_m_s,
+        max_turn_rate_rad_s: TURN_LIMIT_RAD_S,
+        max_acceleration_m_s2: 10.0,
+    };
+    let task = TaskSheet { speed_m_s: terms.speed_m_s, control_period_s: terms.period_s, arrival_radius_m: terms.radius_m };
+    method::build(MethodKind::AnchoredEkf, law, Briefing { home: home.clone(), robot, task }, None)
 }
 
 /// A homing vector at constant speed, steered by the same two laws: proportionally to the angle between heading and vector,
