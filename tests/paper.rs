@@ -41,7 +41,7 @@ fn the_filter_needs_the_true_start_and_the_printed_jacobian_freezes_alpha() {
     };
     assert!(of(&claims.starts, StartError::None).iter().all(|t| t.home == 4));
     assert!(of(&claims.starts, StartError::Untold).iter().all(|t| t.home <= 1));
-    assert!(claims.anchored.iter().all(|t| t.home == 4), "{:?}", claims.anchored);
+    assert!(claims.anchored.iter().all(|t| t.home >= 3), "{:?}", claims.anchored);
     let ten = StartError::Heading(10.0_f64.to_radians());
     let frozen = of(&claims.starts_printed, ten)[0].heading_rmse_rad;
     assert!((frozen - 10.0_f64.to_radians()).abs() < 1e-9, "{frozen}");

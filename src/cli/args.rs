@@ -71,6 +71,9 @@ pub enum Command {
     Drive(DriveArgs),
     /// Hold the physics against its closed forms: a page of charts, and the slip map
     PhysicsReport(PhysicsReportArgs),
+    /// Every method from the same starts: success, time, path, final error, AAE, catchment area
+    #[command(after_help = EXIT_CODES)]
+    Compare(Box<super::compare::CompareArgs>),
     /// Rebuild the paper's tables and figures beside the printed numbers, and audit its claims
     Reproduce(super::reproduce::ReproduceArgs),
     /// Where the paper's state can be told from bearings and motion: rank and condition over a room
@@ -281,12 +284,12 @@ pub enum WorldCommand {
 /// A value of the library, what it is called here, and what `--help` says of it.
 pub type Choice<T> = (T, &'static str, &'static str);
 
-const PLANTS: &[Choice<PlantKind>] = &[
+pub const PLANTS: &[Choice<PlantKind>] = &[
     (PlantKind::Rapier, "rapier", "Wheels that slip, motors, encoders, collisions"),
     (PlantKind::Unicycle, "unicycle", "The unicycle's kinematics with perfect odometry; nothing stops it"),
 ];
 
-const BEARINGS: &[Choice<Bearings>] = &[
+pub const BEARINGS: &[Choice<Bearings>] = &[
     (Bearings::Rendered, "rendered", "Features of rendered panoramas, found again from the home panorama"),
     (Bearings::Ideal, "ideal", "True bearings of the landmark bodies' centres, where nothing hides them"),
     (Bearings::Noisy, "noisy", "Ideal bearings with noise, drop-outs and false matches"),
@@ -306,7 +309,7 @@ const LAWS: &[Choice<LawKind>] = &[
     (LawKind::Lyapunov, "lyapunov", "The paper's switching law"),
 ];
 
-const RENDERERS: &[Choice<RendererChoice>] = &[
+pub const RENDERERS: &[Choice<RendererChoice>] = &[
     (RendererChoice::Auto, "auto", "A hardware GPU where there is one, else the CPU"),
     (RendererChoice::Gpu, "gpu", "Any graphics adapter, a software one included"),
     (RendererChoice::Cpu, "cpu", "The CPU"),
@@ -373,7 +376,7 @@ pub fn positive(text: &str) -> Result<f64, String> {
     number(text).and_then(|v| if v > 0.0 { Ok(v) } else { Err("must be greater than 0".into()) })
 }
 
-fn not_negative(text: &str) -> Result<f64, String> {
+pub fn not_negative(text: &str) -> Result<f64, String> {
     number(text).and_then(|v| if v >= 0.0 { Ok(v) } else { Err("must not be negative".into()) })
 }
 
@@ -399,7 +402,7 @@ fn start(text: &str) -> Result<Start, String> {
 }
 
 /// `WxH` in pixels.
-fn size(text: &str) -> Result<(u32, u32), String> {
+pub fn size(text: &str) -> Result<(u32, u32), String> {
     let (width, height) = text
         .split_once('x')
         .and_then(|(w, h)| Some((w.parse::<u32>().ok()?, h.parse::<u32>().ok()?)))
@@ -414,7 +417,7 @@ fn size(text: &str) -> Result<(u32, u32), String> {
 const MOST_SEEDS: u64 = 100_000;
 
 /// `A..B`, both ends included.
-fn seeds(text: &str) -> Result<RangeInclusive<u64>, String> {
+pub fn seeds(text: &str) -> Result<RangeInclusive<u64>, String> {
     let (first, last) = text
         .split_once("..")
         .and_then(|(a, b)| Some((a.parse::<u64>().ok()?, b.strip_prefix('=').unwrap_or(b).parse::<u64>().ok()?)))

@@ -5,6 +5,7 @@
 
 pub mod args;
 mod bound;
+mod compare;
 mod context;
 mod drive;
 mod home;
@@ -38,6 +39,7 @@ pub fn run(args: Args) -> Result<Verdict> {
         Command::PhysicsReport(args) => physics_report::run(&args, &context),
         Command::Robustness(args) => robustness::run(&args, &context),
         Command::Bound(args) => bound::run(&args, &context),
+        Command::Compare(args) => compare::run(&args, &context),
         Command::Observability(args) => observability::run(&args, &context),
         Command::Reproduce(args) => reproduce::run(&args, &context),
         Command::Render(args) => render::run(&args, &context),

@@ -17,7 +17,7 @@ use wayhome::study::paper::images::{ImageCase, ImageSet, image_settings};
 use wayhome::world::World;
 
 use super::Verdict;
-use super::args::{self, TARGETS, choice};
+use super::args::{TARGETS, choice};
 use super::context::Context;
 
 /// Arguments of `reproduce`.
@@ -196,6 +196,6 @@ mod tests {
 
     #[test]
     fn targets_have_their_names() {
-        assert!(Target::ALL.iter().all(|target| args::name_of(TARGETS, &Some(*target)) == target.name()));
+        assert!(Target::ALL.iter().all(|target| crate::cli::args::name_of(TARGETS, &Some(*target)) == target.name()));
     }
 }

@@ -9,7 +9,7 @@
 //! theta_i' = v sin(theta_i) sin(theta_i* - theta_i - alpha) / (R sin(theta - theta_i*)) - omega, and automatic differentiation of
 //! the printed form agrees (`tests/paper.rs`).
 
-use crate::geometry::{Pose, Vector2, angle_of, sin_cos, wrap};
+use crate::geometry::{Pose, Vector2, angle_of, cross, sin_cos, wrap};
 
 /// Singular values below this share of the greatest are zero but for rounding.
 const ZERO: f64 = 1e-9;
@@ -32,9 +32,12 @@ pub struct Observability {
     pub landmarks: usize,
     /// Rank of O, n + 3 at most.
     pub rank: usize,
-    /// Greatest over least singular value of [J K P], with R and R theta in units of `length_m` so that it does not hang on the
-    /// unit; infinite where the block is singular.
+    /// Greatest over least singular value of [J K P], with R in units of `length_m` so that it does not hang on the unit; infinite
+    /// where the block or the model is singular.
     pub condition: f64,
+    /// The same with the place across the line of sight, R theta, in that unit instead of theta: free of what is singular about polar
+    /// coordinates alone.
+    pub condition_in_plane: f64,
 }
 
 impl Observability {
@@ -50,32 +53,38 @@ impl Observability {
 #[must_use]
 pub fn observability(pose: &Pose, landmarks: &[Vector2<f64>], moving: bool, length_m: f64) -> Observability {
     let n = landmarks.len();
-    let at_rest = Observability { landmarks: n, rank: n, condition: f64::INFINITY };
+    let blind = Observability { landmarks: n, rank: n, condition: f64::INFINITY, condition_in_plane: f64::INFINITY };
     if !moving {
-        return at_rest;
+        return blind;
     }
     let position = pose.position();
     let (r, theta) = (position.norm(), angle_of(position));
     let rows: Vec<[f64; 3]> = landmarks
         .iter()
+        // On the line through home and a landmark (3) divides by zero: its row has no value, the others decide.
+        .filter(|landmark| r > 0.0 && (cross(position, **landmark) / (r * landmark.norm())).abs() > ZERO)
         .map(|landmark| {
             let bearing = wrap(angle_of(landmark - position) - pose.heading);
             let [j, k, p, _] = rate_gradient(r, theta, pose.heading, bearing, angle_of(*landmark));
-            [j * length_m, k / r * length_m, p]
+            [j * length_m, k, p]
         })
         .collect();
-    if rows.iter().flatten().any(|v| !v.is_finite()) {
-        // On the line of a landmark its row has no value; the others alone decide the rank.
-        let others: Vec<[f64; 3]> = rows.into_iter().filter(|row| row.iter().all(|v| v.is_finite())).collect();
-        return Observability { rank: n + rank(&singular_values(&others)), ..at_rest };
-    }
     let values = singular_values(&rows);
-    let condition = if values[2] > 0.0 { values[0] / values[2] } else { f64::INFINITY };
-    Observability { landmarks: n, rank: n + rank(&values), condition }
+    let rank = n + values.iter().filter(|v| **v > ZERO * values[0]).count();
+    if rows.len() < n {
+        return Observability { rank, ..blind };
+    }
+    let in_plane: Vec<[f64; 3]> = rows.iter().map(|[j, k, p]| [*j, k / r * length_m, *p]).collect();
+    Observability {
+        landmarks: n,
+        rank,
+        condition: condition(&values),
+        condition_in_plane: condition(&singular_values(&in_plane)),
+    }
 }
 
-fn rank(values: &[f64; 3]) -> usize {
-    values.iter().filter(|v| **v > ZERO * values[0]).count()
+fn condition(values: &[f64; 3]) -> f64 {
+    if values[2] > ZERO * values[0] { values[0] / values[2] } else { f64::INFINITY }
 }
 
 /// Singular values of a matrix of three columns, descending, by one-sided Jacobi rotations (Hestenes 1958), which keep small ones exact
@@ -135,9 +144,11 @@ mod tests {
         let robot = Vector2::new(-0.6, 0.4);
         let towards = angle_of(LANDMARKS[1] - robot);
         assert_eq!(at(robot.x, robot.y, towards).rank, 5, "its bearing stands still whatever its range");
-        // Landmark 1 lies at angle(1, 1.8): the point half way to it is on its line, up to rounding.
         let half = LANDMARKS[1] * 0.5;
-        assert!(at(half.x, half.y, 0.3).condition > 1e6);
-        assert!(!at(0.0, 0.0, 0.3).is_full());
+        assert_eq!((at(half.x, half.y, 0.3).rank, at(half.x, half.y, 0.3).condition), (5, f64::INFINITY));
+        assert_eq!(at(0.0, 0.0, 0.3).rank, 3);
+        // Near home it is theta that cannot be told, not the place.
+        let near = at(-0.006, 0.004, 1.5);
+        assert!(near.condition > 100.0 && near.condition_in_plane < 100.0, "{near:?}");
     }
 }

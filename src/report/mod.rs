@@ -5,6 +5,7 @@
 
 pub mod bound;
 pub mod chart;
+pub mod compare;
 pub mod drive;
 mod folder;
 pub mod image;

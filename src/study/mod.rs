@@ -1,6 +1,7 @@
 //! Studies: many episodes, and what they say together.
 
 pub mod bound;
+pub mod compare;
 pub mod observability;
 pub mod paper;
 pub mod physics;

@@ -57,7 +57,7 @@ pub struct ObservabilityMap {
     pub spacing_m: f64,
     /// Landmarks that are seen from home.
     pub home_landmarks: usize,
-    /// The length that R and R theta are measured in, the mean distance of those landmarks from home, m.
+    /// The length that R is measured in, the mean distance of those landmarks from home, m.
     pub length_m: f64,
     /// All places in the room.
     pub places: Vec<PlaceObservability>,

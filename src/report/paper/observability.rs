@@ -27,16 +27,18 @@ pub fn observability(ideal: &Ideal, runs: &[Run], homeward: &ObservabilityMap, e
         "## Observability: the rank and condition of O\n\n`wayhome reproduce observability`; for any world `wayhome observability \
          WORLD`. O of (14) stacks the gradients of the bearings and of their rates at unit speed, so its rank is the number of \
          landmarks plus the rank of the block [J K P]. The printed J, K, P and Q are damaged; here they are derived anew, and a test \
-         holds them against automatic differentiation of (4) with (3). The condition is that of [J K P] with lengths in units of the \
+         holds them against automatic differentiation of (4) with (3). The condition is that of [J K P] with R in units of the \
          landmarks' mean distance ({length:.2} m); above {limit:.0} it is degenerate in practice.\n\n{cases}\n\
          So rank six holds for a robot that moves, away from home, with no landmark straight ahead or behind, off the lines through home \
          and a landmark. Nothing in omega changes it: the gradients of the Lie derivatives along g2 are zero everywhere. Two bearing \
-         sets without motion leave R, theta and alpha open.\n\n![Condition, driving towards home](observability-homeward.svg)\n\n\
-         Driving towards home, {share:.0} % of the room is degenerate in practice, median condition {median:.0}: near home, on the \
-         lines through home and a landmark, and where several effects meet. The very way that homing takes leads into the singularity.\n\n\
-         ![Condition, facing along x](observability-east.svg)\n\nFacing along x everywhere, {east_share:.0} % is degenerate: the dark \
-         lines that end at no landmark are those through home; the horizontal ones through each landmark are where it lies straight ahead \
-         or behind.\n\n![Condition along the paths](observability-paths.svg)\n\n{geometries}",
+         sets without motion leave R, theta and alpha open. Close to home it is the bearing theta of a vanishing R that cannot be told; in \
+         the plane the place can. The lines through home and a landmark are singular because (3) divides by zero there: parallax \
+         from home says nothing of that landmark's range.\n\n![Condition, driving towards home](observability-homeward.svg)\n\n\
+         Driving towards home, {share:.0} % of the room is degenerate in practice, median condition {median:.0}: around \
+         home, and on the lines through home and a landmark, dotted where a place lies exactly on one. The very way that homing takes \
+         leads into the singularity.\n\n\
+         ![Condition, facing along x](observability-east.svg)\n\nFacing along x everywhere, {east_share:.0} % is degenerate: beside the lines \
+         through home there is now a level one through each landmark, where it lies straight ahead or behind.\n\n![Condition along the paths](observability-paths.svg)\n\n{geometries}",
         length = homeward.length_m,
         limit = DEGENERATE,
         cases = cases_table(&cases(&landmarks, start)),
@@ -87,16 +89,25 @@ pub fn summary(map: &ObservabilityMap, facing: &str) -> String {
 }
 
 fn cases_table(cases: &[Case]) -> String {
-    let mut text = "| case | rank of O | condition |\n|---|---:|---:|\n".to_owned();
+    let mut text = "| case | rank of O | condition | condition with R theta for theta |\n|---|---:|---:|---:|\n".to_owned();
+    let finite = |condition: f64| if condition.is_finite() { short(condition) } else { "infinite".into() };
     for case in cases {
-        let condition = if case.found.condition < 1e12 { short(case.found.condition) } else { "infinite".into() };
-        let _ = writeln!(text, "| {} | {} of {} | {condition} |", case.name, case.found.rank, case.found.landmarks + 3);
+        let o = case.found;
+        let _ = writeln!(
+            text,
+            "| {} | {} of {} | {} | {} |",
+            case.name,
+            o.rank,
+            o.landmarks + 3,
+            finite(o.condition),
+            finite(o.condition_in_plane)
+        );
     }
     text
 }
 
 fn geometries_table(geometries: &[Geometry]) -> String {
-    let mut text = "Over landmark geometries, 400 random poses 0.3 to 1.2 m from home, any heading, lengths in metres:\n\n| landmarks | over an \
+    let mut text = "Over landmark geometries, 400 random poses 0.3 to 1.2 m from home, any heading, R in metres:\n\n| landmarks | over an \
          arc of | at | median condition | degenerate |\n|---:|---:|---:|---:|---:|\n"
         .to_owned();
     for g in geometries {
