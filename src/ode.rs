@@ -99,7 +99,7 @@ mod tests {
         let miss = |[x, y, _]: [f64; 3]| (Pose::new(x, y, 0.0).position() - exact.position()).norm();
         assert!(miss(end(Tolerance::TIGHT)) < 1e-10, "{}", miss(end(Tolerance::TIGHT)));
         let loose = miss(end(Tolerance::ODE45));
-        assert!(loose > 1e-9 && loose < 1e-3, "{loose}");
+        assert!(loose > 1e-9 && loose < 1e-2, "{loose}");
     }
 
     /// A slope that grows steeply makes it cut its steps: y' = y^2 from 1 reaches 1 / (1 - t).

@@ -7,6 +7,9 @@ use wayhome::control::Law;
 use wayhome::control::vectors::VectorLaw;
 use wayhome::estimation::observability::rate_gradient;
 use wayhome::estimation::paper::{PaperSettings, Transition};
+use wayhome::geometry::Pose;
+use wayhome::panorama::Panorama;
+use wayhome::render::{CpuRenderer, Renderer, Scene, View};
 use wayhome::study::paper::claims::{StartError, claims, image_claims};
 use wayhome::study::paper::contest::{Entrant, Source, Told, contest};
 use wayhome::study::paper::ideal::{Ideal, Twists};
@@ -102,4 +105,50 @@ fn the_comparison_has_the_order_that_the_page_states() {
     let claims = image_claims(&case);
     assert!(claims.blind.iter().all(|t| t.range_rmse_cm < 1e-6) && claims.faithful.iter().all(|t| t.range_rmse_cm > 1e-4));
     assert!(claims.one_look_cm > 0.1 && claims.untold.iter().all(|t| t.home <= 1));
+}
+
+/// Writes the rendered set as Vardy's database has it: grey, azimuth falling with the column, rows even in elevation.
+fn write_as_vardy_does(folder: &std::path::Path) {
+    let world = World::open("vardy-hall").unwrap();
+    let (scene, grid, projection) = (Scene::new(&world).unwrap(), ImageSet::Vardy.grid(), world.projection());
+    let (width, height) = (projection.width as usize, projection.height as usize);
+    let mut renderer = CpuRenderer::new();
+    let mut panorama = Panorama::black(projection);
+    for place in grid.places() {
+        let at = grid.position(place);
+        let robot = world.home.compose(&Pose::new(at.x, at.y, 0.0));
+        renderer.render(&scene, &View { projection, robot, bodies: &world.body_poses() }, &mut panorama).unwrap();
+        let luma = panorama.luma();
+        let mut bytes = format!("P5\n{width} {height}\n255\n").into_bytes();
+        for row in 0..height {
+            let elevation = projection.pixel_rad() * ((height as f64 - 1.0) / 2.0 - row as f64);
+            let from = projection.row(elevation.tan()).clamp(0.0, height as f64 - 1.0).round() as usize;
+            bytes.extend((0..width).map(|column| luma[from * width + (width - column) % width].round() as u8));
+        }
+        std::fs::write(folder.join(format!("{}_{}.pgm", place.i, place.j)), bytes).unwrap();
+    }
+}
+
+/// A set on disk takes the place of the rendered one: the same objects at the same bearings, and the same runs home.
+#[test]
+fn a_set_on_disk_drops_in() {
+    let folder = tempfile::tempdir().unwrap();
+    write_as_vardy_does(folder.path());
+    let disk = ImageCase::new(ImageSet::Vardy, Some(folder.path())).unwrap();
+    let rendered = ImageCase::new(ImageSet::Vardy, None).unwrap();
+    assert!(!disk.rendered && disk.field.size_px == rendered.field.size_px);
+    let mut misses = Vec::new();
+    for object in &disk.field.objects {
+        let Some(same) = rendered.field.objects.iter().find(|o| (o.home_rad - object.home_rad).abs() < 1e-9) else { continue };
+        let both =
+            object.seen_rad.iter().zip(&same.seen_rad).filter_map(|(a, b)| Some(wayhome::geometry::wrap((*a)? - (*b)?).abs()));
+        misses.extend(both);
+    }
+    misses.sort_by(f64::total_cmp);
+    println!("{} bearings in common, median difference {:.3} deg", misses.len(), misses[misses.len() / 2].to_degrees());
+    assert!(misses.len() > 300 && misses[misses.len() / 2] < 0.3_f64.to_radians());
+    assert!(disk.runs(wayhome::study::paper::images::image_settings(), |start| *start).iter().all(|run| run.track.home));
+    // A set of another grid is refused by what it has.
+    std::fs::remove_file(folder.path().join("9_16.pgm")).unwrap();
+    assert!(ImageCase::new(ImageSet::Vardy, Some(folder.path())).unwrap_err().to_string().contains("(9, 16)"));
 }

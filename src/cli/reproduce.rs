@@ -87,11 +87,15 @@ pub fn run(args: &ReproduceArgs, context: &Context) -> Result<Verdict> {
     Ok(Verdict::Done)
 }
 
-/// A folder of panoramas takes the place of one set, so what is reproduced must be of that set.
+/// A folder of panoramas takes the place of one set, so what is reproduced must be of that set, and the set whole.
 fn check_dataset(args: &ReproduceArgs, wanted: &[Target]) -> Result<(), Error> {
+    let Some(folder) = &args.dataset else { return Ok(()) };
     let of_one_set = |set: &[Target]| wanted.iter().all(|t| set.contains(t));
-    if args.dataset.is_none() || of_one_set(&[Target::Table2, Target::Fig5]) || of_one_set(&[Target::Fig7]) {
-        return Ok(());
+    if of_one_set(&[Target::Table2, Target::Fig5]) {
+        return ImageSet::Paper.open(folder).map(|_| ());
+    }
+    if of_one_set(&[Target::Fig7]) {
+        return ImageSet::Vardy.open(folder).map(|_| ());
     }
     let names: Vec<&str> = wanted.iter().map(|t| t.name()).collect();
     Err(Error::Invalid {

@@ -33,7 +33,7 @@ pub struct Observability {
     /// Rank of O, n + 3 at most.
     pub rank: usize,
     /// Greatest over least singular value of [J K P], with R in units of `length_m` so that it does not hang on the unit; infinite
-    /// where the block or the model is singular.
+    /// where the block is singular. Landmarks on whose line through home the robot stands are left out.
     pub condition: f64,
     /// The same with the place across the line of sight, R theta, in that unit instead of theta: free of what is singular about polar
     /// coordinates alone.
@@ -71,9 +71,6 @@ pub fn observability(pose: &Pose, landmarks: &[Vector2<f64>], moving: bool, leng
         .collect();
     let values = singular_values(&rows);
     let rank = n + values.iter().filter(|v| **v > ZERO * values[0]).count();
-    if rows.len() < n {
-        return Observability { rank, ..blind };
-    }
     let in_plane: Vec<[f64; 3]> = rows.iter().map(|[j, k, p]| [*j, k / r * length_m, *p]).collect();
     Observability {
         landmarks: n,

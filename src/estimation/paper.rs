@@ -50,17 +50,23 @@ pub enum Transition {
 }
 
 /// How the mean is carried over a sampling interval.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Prediction {
-    /// By Dormand and Prince's method, as the paper has it.
-    Ode,
+    /// By Dormand and Prince's method, as the paper has it, to this tolerance.
+    Ode(Tolerance),
     /// One step of Euler's method.
     Euler,
 }
 
 impl Default for PaperSettings {
     fn default() -> Self {
-        Self { process: 0.01, measurement: 0.1, initial: 1.0, transition: Transition::Discrete, prediction: Prediction::Ode }
+        Self {
+            process: 0.01,
+            measurement: 0.1,
+            initial: 1.0,
+            transition: Transition::Discrete,
+            prediction: Prediction::Ode(Tolerance::TIGHT),
+        }
     }
 }
 
@@ -174,9 +180,9 @@ impl PaperEkf {
         };
         let slope = |x: &State| dynamics(x, u, &self.home_bearings).0;
         self.state = match self.settings.prediction {
-            Prediction::Ode => {
+            Prediction::Ode(tolerance) => {
                 let slope = |x: &[f64; 6]| slope(&State::from(*x)).into();
-                State::from(integrate(slope, self.state.into(), dt, Tolerance::TIGHT))
+                State::from(integrate(slope, self.state.into(), dt, tolerance))
             }
             Prediction::Euler => self.state + slope(&self.state) * dt,
         };

@@ -4,7 +4,6 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::paper::ideal::Run;
-use super::statistics::quantile;
 use crate::episode::sensor::{IdealSensor, Sensor};
 use crate::error::{Error, Result};
 use crate::estimation::observability::{Observability, observability};
@@ -74,8 +73,17 @@ impl ObservabilityMap {
     /// A quantile of the condition over the places.
     #[must_use]
     pub fn condition_quantile(&self, share: f64) -> f64 {
-        quantile(&self.places.iter().map(|p| p.condition).collect::<Vec<_>>(), share).unwrap_or(f64::NAN)
+        ranked(self.places.iter().map(|p| p.condition), share)
     }
+}
+
+/// A quantile that is one of the values, because between infinite ones nothing can be interpolated. NaN of none.
+#[must_use]
+pub fn ranked(values: impl Iterator<Item = f64>, share: f64) -> f64 {
+    let mut sorted: Vec<f64> = values.collect();
+    sorted.sort_by(f64::total_cmp);
+    let last = sorted.len().saturating_sub(1);
+    sorted.get((share.clamp(0.0, 1.0) * last as f64).round() as usize).copied().unwrap_or(f64::NAN)
 }
 
 /// Maps a world: at every place of an even grid in the room, the landmarks that are seen there and were seen at home.
@@ -133,7 +141,7 @@ pub fn map(world: &World, facing: Facing, spacing_m: f64) -> Result<Observabilit
             rank: here.rank - landmarks.len(),
             condition: here.condition,
             best_condition: all.iter().copied().fold(f64::INFINITY, f64::min),
-            median_condition: quantile(&all, 0.5).unwrap_or(f64::INFINITY),
+            median_condition: ranked(all.iter().copied(), 0.5),
         })
     };
     Ok(ObservabilityMap {
@@ -244,7 +252,7 @@ pub fn geometries() -> Vec<Geometry> {
                 count,
                 arc_rad,
                 range_m,
-                median: quantile(&conditions, 0.5).unwrap_or(f64::NAN),
+                median: ranked(conditions.iter().copied(), 0.5),
                 degenerate_share: conditions.iter().filter(|c| **c > DEGENERATE).count() as f64 / conditions.len() as f64,
             }
         })

@@ -141,7 +141,13 @@ fn page(before: &str, sections: &[Section]) -> String {
 
 /// A small or large number in two digits: 3.7e-5.
 fn short(value: f64) -> String {
-    if value == 0.0 { "0".to_owned() } else { format!("{value:.1e}") }
+    if value == 0.0 {
+        "0".to_owned()
+    } else if value.is_infinite() {
+        "infinite".to_owned()
+    } else {
+        format!("{value:.1e}")
+    }
 }
 
 #[cfg(test)]

@@ -8,7 +8,7 @@ use crate::error::Result;
 use crate::geometry::Vector2;
 use crate::report::chart::{Axis, Chart, Ramp, Stroke};
 use crate::report::map::MapDrawing;
-use crate::study::observability::{Case, DEGENERATE, Geometry, ObservabilityMap, along, cases, geometries};
+use crate::study::observability::{Case, DEGENERATE, Geometry, ObservabilityMap, along, cases, geometries, ranked};
 use crate::study::paper::ideal::{Ideal, Run};
 use crate::world::World;
 
@@ -73,8 +73,7 @@ pub fn summary(map: &ObservabilityMap, facing: &str) -> String {
     let [q10, q50, q90] = [0.1, 0.5, 0.9].map(|share| short(map.condition_quantile(share)));
     let full = map.places.iter().filter(|p| p.rank == 3).count();
     let blind = map.places.iter().filter(|p| p.landmarks < 3).count();
-    let best: Vec<f64> = map.places.iter().map(|p| p.best_condition).collect();
-    let best = crate::study::statistics::quantile(&best, 0.5).unwrap_or(f64::NAN);
+    let best = ranked(map.places.iter().map(|p| p.best_condition), 0.5);
     format!(
         "{world}, {facing}, {n} places {spacing} m apart, {landmarks} landmarks seen from home\n  full rank                    {full} of {n}\n  \
          fewer than three landmarks   {blind} of {n}\n  condition, 10 / 50 / 90 %    {q10} / {q50} / {q90}\n  degenerate in practice       \
@@ -90,7 +89,6 @@ pub fn summary(map: &ObservabilityMap, facing: &str) -> String {
 
 fn cases_table(cases: &[Case]) -> String {
     let mut text = "| case | rank of O | condition | condition with R theta for theta |\n|---|---:|---:|---:|\n".to_owned();
-    let finite = |condition: f64| if condition.is_finite() { short(condition) } else { "infinite".into() };
     for case in cases {
         let o = case.found;
         let _ = writeln!(
@@ -99,8 +97,8 @@ fn cases_table(cases: &[Case]) -> String {
             case.name,
             o.rank,
             o.landmarks + 3,
-            finite(o.condition),
-            finite(o.condition_in_plane)
+            short(o.condition),
+            short(o.condition_in_plane)
         );
     }
     text

@@ -7,6 +7,7 @@ use crate::control::Law;
 use crate::error::Result;
 use crate::estimation::paper::{PaperSettings, Prediction, Transition};
 use crate::geometry::{Pose, Vector2, angle_of, direction};
+use crate::ode::Tolerance;
 
 /// Where a filter starts that is told nothing: R = 50 cm, theta = 0.1, alpha = 0.
 #[must_use]
@@ -104,6 +105,8 @@ pub struct Claims {
     pub noise: Vec<(f64, Both)>,
     /// The filter started at the truth with a prediction by Euler's method.
     pub euler: Both,
+    /// The same with a prediction to ode45's default tolerance.
+    pub ode45: Both,
     /// The anchored filter, told nothing.
     pub anchored: Both,
     /// Beta, Ts (s), and the tally of the nonlinear law.
@@ -131,7 +134,10 @@ pub fn claims(ideal: &Ideal) -> Result<Claims> {
             .collect();
         (sd_rad, both(&runs))
     };
-    let euler = PaperSettings { prediction: Prediction::Euler, ..PaperSettings::default() };
+    let predicted = |prediction| {
+        let settings = PaperSettings { prediction, ..PaperSettings::default() };
+        both(&ideal.runs(&Twists { settings, ..Twists::default() }, |start| *start))
+    };
     let beta = [0.1, 0.01]
         .into_iter()
         .flat_map(|period_s| [1.01, BETA, 2.0, 3.0, 5.0, 10.0, 20.0].into_iter().map(move |beta| (beta, period_s)));
@@ -140,7 +146,8 @@ pub fn claims(ideal: &Ideal) -> Result<Claims> {
         starts_printed: started(printed),
         // 0.3 degrees, 1 degree, and the square root of M = 0.1.
         noise: [0.3_f64.to_radians(), 1.0_f64.to_radians(), 0.1_f64.sqrt()].map(noise).to_vec(),
-        euler: both(&ideal.runs(&Twists { settings: euler, ..Twists::default() }, |start| *start)),
+        euler: predicted(Prediction::Euler),
+        ode45: predicted(Prediction::Ode(Tolerance::ODE45)),
         anchored: both(&ideal.anchored()?),
         beta: beta
             .map(|(beta, period_s)| {

@@ -60,6 +60,22 @@ impl ImageSet {
         }
     }
 
+    /// Such a set on disk.
+    ///
+    /// # Errors
+    /// When it is not whole or has another grid.
+    pub fn open(self, folder: &Path) -> Result<PanoramaSet> {
+        let (files, grid) = (PanoramaSet::open(folder, self.layout())?, self.grid());
+        if files.shape() != (grid.rows, grid.columns) {
+            return Err(Error::Invalid {
+                what: format!("grid of the set in {}", folder.display()),
+                found: format!("{} x {} places", files.shape().0, files.shape().1),
+                allowed: format!("{} x {}", grid.rows, grid.columns),
+            });
+        }
+        Ok(files)
+    }
+
     /// Settings that suit the size of its pictures.
     fn extractor(self) -> ExtractorSettings {
         match self {
@@ -98,14 +114,7 @@ impl ImageCase {
         let grid = set.grid();
         let (home, field) = match folder {
             Some(folder) => {
-                let files = PanoramaSet::open(folder, set.layout())?;
-                if files.shape() != (grid.rows, grid.columns) {
-                    return Err(Error::Invalid {
-                        what: format!("grid of the set in {}", folder.display()),
-                        found: format!("{} x {} places", files.shape().0, files.shape().1),
-                        allowed: format!("{} x {}", grid.rows, grid.columns),
-                    });
-                }
+                let files = set.open(folder)?;
                 ObjectField::extract(grid, &set.extractor(), &|place| files.load(place))?
             }
             None => {
