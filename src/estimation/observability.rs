@@ -102,11 +102,9 @@ pub fn singular_values(rows: &[[f64; 3]]) -> [f64; 3] {
             let t = (if zeta < 0.0 { -1.0 } else { 1.0 }) / (zeta.abs() + (1.0 + zeta * zeta).sqrt());
             let c = 1.0 / (1.0 + t * t).sqrt();
             let s = c * t;
-            for k in 0..rows.len() {
-                let (a, b) = (columns[p][k], columns[q][k]);
-                columns[p][k] = c * a - s * b;
-                columns[q][k] = s * a + c * b;
-            }
+            let [a, b] = [std::mem::take(&mut columns[p]), std::mem::take(&mut columns[q])];
+            columns[p] = a.iter().zip(&b).map(|(a, b)| c * a - s * b).collect();
+            columns[q] = a.iter().zip(&b).map(|(a, b)| s * a + c * b).collect();
         }
         if greatest < 1e-15 {
             break;

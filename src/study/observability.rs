@@ -17,6 +17,10 @@ pub const DEGENERATE: f64 = 1000.0;
 /// Headings tried at a place where the best and the median one are wanted.
 const HEADINGS: usize = 72;
 
+/// The condition is taken this far off a cell's middle, m: on the line through home and a landmark the model divides zero by zero,
+/// and round numbers meet such lines where nothing else would.
+const OFF: Vector2<f64> = Vector2::new(1.1e-3, 0.7e-3);
+
 /// How the robot faces at each place of a map.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Facing {
@@ -126,7 +130,7 @@ pub fn map(world: &World, facing: Facing, spacing_m: f64) -> Result<Observabilit
         let seen = sensor.observe(Pose::new(point.x, point.y, 0.0), &bodies)?;
         let landmarks: Vec<Vector2<f64>> =
             seen_at_home.iter().filter(|(id, _)| seen.iter().any(|b| b.id.0 == *id)).map(|(_, l)| *l).collect();
-        let local = world.home.inverse_transform(*point);
+        let local = world.home.inverse_transform(*point + OFF);
         let at = |heading: f64| observability(&Pose::new(local.x, local.y, heading), &landmarks, true, length_m);
         let here = at(match facing {
             Facing::Homeward => angle_of(-local),

@@ -32,13 +32,13 @@ pub fn observability(ideal: &Ideal, runs: &[Run], homeward: &ObservabilityMap, e
          So rank six holds for a robot that moves, away from home, with no landmark straight ahead or behind, off the lines through home \
          and a landmark. Nothing in omega changes it: the gradients of the Lie derivatives along g2 are zero everywhere. Two bearing \
          sets without motion leave R, theta and alpha open. Close to home it is the bearing theta of a vanishing R that cannot be told; in \
-         the plane the place can. The lines through home and a landmark are singular because (3) divides by zero there: parallax \
-         from home says nothing of that landmark's range.\n\n![Condition, driving towards home](observability-homeward.svg)\n\n\
-         Driving towards home, {share:.0} % of the room is degenerate in practice, median condition {median:.0}: around \
-         home, and on the lines through home and a landmark, dotted where a place lies exactly on one. The very way that homing takes \
-         leads into the singularity.\n\n\
-         ![Condition, facing along x](observability-east.svg)\n\nFacing along x everywhere, {east_share:.0} % is degenerate: beside the lines \
-         through home there is now a level one through each landmark, where it lies straight ahead or behind.\n\n![Condition along the paths](observability-paths.svg)\n\n{geometries}",
+         the plane the place can. On the lines through home and a landmark (3) divides by zero: parallax from home says nothing of \
+         that landmark's range. This is O as the paper cuts it off, after first derivatives; what a whole path \
+         tells, turns included, is what `wayhome bound` computes.\n\n![Condition, driving towards home](observability-homeward.svg)\n\n\
+         Driving towards home, {share:.1} % of the room is degenerate in practice, median condition {median:.0}: at home and at the \
+         landmarks. The lines through home and a landmark do not show: along them the rate of its bearing vanishes as fast as the \
+         divisor. To any other heading they are walls, as the next map shows.\n\n![Condition, facing along x](observability-east.svg)\n\nFacing along x everywhere, {east_share:.1} % is degenerate: the lines \
+         through home and a landmark, and a level one through each landmark, where it lies straight ahead or behind.\n\n![Condition along the paths](observability-paths.svg)\n\n{geometries}",
         length = homeward.length_m,
         limit = DEGENERATE,
         cases = cases_table(&cases(&landmarks, start)),

@@ -123,7 +123,7 @@ impl ImageCase {
                 let shelf: Mutex<Vec<CpuRenderer>> = Mutex::default();
                 let render = |place: Place| -> Result<Panorama> {
                     let taken = shelf.lock().ok().and_then(|mut shelf| shelf.pop());
-                    let mut renderer = taken.unwrap_or_else(CpuRenderer::new);
+                    let mut renderer = taken.unwrap_or_default();
                     let at = grid.position(place);
                     let robot = world.home.compose(&Pose::new(at.x, at.y, 0.0));
                     let mut panorama = Panorama::black(world.projection());

@@ -220,9 +220,12 @@ fn choose(candidates: &[Object]) -> Option<Vec<Object>> {
     Some(chosen)
 }
 
+/// Row and right-hand side of one line of sight (from, azimuth).
+type Equation<'a> = &'a dyn Fn(&Vector2<f64>, f64) -> (Vector2<f64>, f64);
+
 /// Least squares of the azimuths' misses by Gauss-Newton steps from the point nearest to all lines of sight.
 fn triangulate(sights: &[(Vector2<f64>, f64)]) -> Option<Fix> {
-    let normals = |weigh: &dyn Fn(&Vector2<f64>, f64) -> (Vector2<f64>, f64)| {
+    let normals = |weigh: Equation<'_>| {
         let mut a = nalgebra::Matrix2::zeros();
         let mut b = Vector2::zeros();
         for (from, azimuth) in sights {
