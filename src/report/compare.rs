@@ -165,7 +165,8 @@ pub fn readme(comparison: &Comparison, command: &str, maps: &[&str]) -> String {
          home](compare.svg)\n\nAll contenders run on `{}` with `{}` bearings from the same random starts (seeds {first} to {last}), at {} m/s, for \
          {} s at most. *Home* claimed to be home and came to rest within {:.0} cm of it; *wrong claims* did so elsewhere. *Time ratio* is time \
          over straight-line time and *path ratio* path over straight distance, medians of the runs that came home; *final* is the median \
-         distance from home at the end of all runs. ",
+         distance from home at the end of all runs. A homing vector says nothing of the distance: methods that steer by one slow down as it \
+         shortens, hence their time ratio. ",
         c.world,
         c.version,
         c.world_sha256,

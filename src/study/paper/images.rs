@@ -23,9 +23,9 @@ use crate::world::World;
 /// One of the two sets.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ImageSet {
-    /// 9 x 19 places, 29.25 cm apart, home (5, 10), 4680 x 480 pixels: [27] of the paper.
+    /// 9 x 19 places, 29.25 cm apart, home (5, 10), 4680 x 480 pixels: reference 27 of the paper.
     Paper,
-    /// 10 x 17 places, 30 cm apart, home (4, 8), 561 x 81 pixels: [28] of the paper.
+    /// 10 x 17 places, 30 cm apart, home (4, 8), 561 x 81 pixels: reference 28 of the paper.
     Vardy,
 }
 
