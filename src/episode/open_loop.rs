@@ -149,19 +149,16 @@ pub struct DriveStep {
     pub collisions: u32,
 }
 
+/// Is shown each state of a drive with the collisions that led to it, and says whether to go on.
+pub type Watch<'a> = dyn FnMut(&DriveStep, &[Collision]) -> Result<ControlFlow<()>> + 'a;
+
 /// Drives `commands` from `start` in `world`, with a state at least every control period of the world's task. `watch` is called
 /// with each state, the one at the start included, and the collisions that led to it; it stops the drive with `Break`. Nothing is
 /// kept but what the summary needs, so that a drive may last as long as it likes.
 ///
 /// # Errors
 /// [`Error::Invalid`] when the table is too long for any disk, [`Error::Interrupted`] when `watch` breaks, and what it fails with.
-pub fn drive(
-    world: &World,
-    start: Pose,
-    seed: Seed,
-    commands: &Commands,
-    watch: &mut dyn FnMut(&DriveStep, &[Collision]) -> Result<ControlFlow<()>>,
-) -> Result<DriveSummary> {
+pub fn drive(world: &World, start: Pose, seed: Seed, commands: &Commands, watch: &mut Watch<'_>) -> Result<DriveSummary> {
     let period_s = world.spec.task.control_period_s;
     if commands.duration_s() / period_s + commands.rows.len() as f64 > MOST_STEPS {
         return Err(Error::Invalid {
