@@ -59,7 +59,7 @@ struct Shapes {
 }
 
 impl Shapes {
-    fn of(world: &World) -> Self {
+    fn of(world: &World, poses: &[Pose]) -> Self {
         let point = |p: &Vector2<f64>| Vector::new(p.x as f32, p.y as f32);
         let n = world.outline.len();
         let corner = |k: usize| point(&world.outline[k % n]);
@@ -67,17 +67,17 @@ impl Shapes {
         let polygon = |corners: &[Vector2<f64>]| {
             SharedShape::new(ConvexPolygon::from_convex_polyline(corners.iter().map(point).collect()).unwrap())
         };
-        let body = |b: &Body| {
+        let body = |(b, pose): (&Body, &Pose)| {
             let shape = match &b.footprint {
                 Footprint::Disc(radius) => SharedShape::ball(*radius as f32),
                 Footprint::Polygon(corners) => polygon(corners),
             };
-            let at = ParryPose::new(point(&b.pose.position()), b.pose.heading as f32);
+            let at = ParryPose::new(point(&pose.position()), pose.heading as f32);
             (shape, at, b.instance, [b.bottom_m as f32, b.top_m as f32])
         };
         let window =
             |w: &Window| (polygon(&w.footprint), ParryPose::identity(), w.instance, [w.bottom_m as f32, w.top_m as f32]);
-        let bodies = world.bodies.iter().map(body).chain(world.windows.iter().map(window)).collect();
+        let bodies = world.bodies.iter().zip(poses).map(body).chain(world.windows.iter().map(window)).collect();
         Self { walls, bodies }
     }
 
@@ -131,11 +131,18 @@ fn every_pixel_sees_what_parrys_rays_meet() {
     let mut stream = Seed(4).stream("poses");
     let (mut pixels, mut at_outlines) = (0, 0);
     for world in built_in.chain([world(HALL), world(STACK)]) {
-        let shapes = Shapes::of(&world);
+        // What can move has moved.
+        let moved = |b: &Body| {
+            if b.motion.is_some() { Pose::new(b.pose.x + 0.1, b.pose.y - 0.2, b.pose.heading + 0.7) } else { b.pose }
+        };
+        let bodies: Vec<Pose> = world.bodies.iter().map(moved).collect();
+        let shapes = Shapes::of(&world, &bodies);
         for kind in [ProjectionKind::Cylindrical, ProjectionKind::EqualAngle] {
             let robot = Pose { heading: 0.3, ..world.random_start(&mut stream).unwrap_or(world.home) };
             let projection = Projection { mount_rad: 0.2, kind, ..world.projection_of_size(200, 80) };
-            let picture = render(&world, projection, robot);
+            let mut picture = Panorama::black(projection);
+            let view = View { projection, robot, bodies: &bodies };
+            CpuRenderer::new().render(&Scene::new(&world).unwrap(), &view, &mut picture).unwrap();
             for k in 0..projection.pixels() {
                 let (column, row) = (k as u32 % projection.width, k as u32 / projection.width);
                 let azimuth = robot.heading + projection.azimuth(f64::from(column));

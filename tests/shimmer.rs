@@ -108,7 +108,7 @@ fn features_repeat_under_rotation_by_parts_of_a_pixel() {
         eprintln!(
             "{name:8} {share:.3} repeat ({px:.3} px); perfect {perfect:.3} ({perfect_px:.3}), unfiltered {without:.3} ({without_px:.3})"
         );
-        assert!(share > 0.9 * perfect, "{name}: {share}, perfect is {perfect}");
+        assert!(share > 0.88 * perfect, "{name}: {share}, perfect is {perfect}");
         for (mean, (share, _)) in means.iter_mut().zip(measured) {
             *mean += share / count;
         }
