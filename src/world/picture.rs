@@ -83,8 +83,9 @@ impl Gallery<'_> {
 }
 
 fn read_below(folder: &Path, path: &str) -> Result<Vec<u8>, Refusal> {
-    let below =
-        || format!("{ALLOWED} in the world file's folder or below, by a relative path without \"..\" and links that leave");
+    let below = || {
+        format!("{ALLOWED} in the world file's folder or below, by a relative path that neither \"..\" nor a link leads out of")
+    };
     let outside = || (format!("\"{path}\", which is outside the world file's folder"), below());
     let relative = Path::new(path);
     let stays = |c: Component<'_>| matches!(c, Component::Normal(_) | Component::CurDir);
