@@ -139,7 +139,7 @@ fn rows(e: &Evidence<'_>) -> Vec<Row> {
             ),
             condition: "filter started at the truth, but for the last",
             command: "wayhome reproduce table1 table2 audit",
-            verdict: "alpha was known and never estimated; the printed G, whose row for alpha is zero, explains the printed figure",
+            verdict: "alpha was known and never estimated; the printed G, whose row for alpha is zero, would explain the printed figure",
         },
         Row {
             claim: "Table II: errors of 1e-2 cm in R from images (bearings of 1/13 degree, interpolated over 29 cm)",

@@ -153,9 +153,9 @@ fn anchored(contest: &Contest) -> String {
             format!("comes home from all four in {ratio:.3} times the straight-line time under the proportional law")
         }
         None => format!(
-            "comes home from {} of 4 under the proportional law and stops elsewhere from the others, sure to be home: bearings that are wrong \
-             by the same amount over half a metre, a hundred times a second, look like good news to a filter that takes their errors for \
-             noise; with exact bearings it does not",
+            "comes home from {} of 4 under the proportional law and from the others stops elsewhere, sure to be home; with exact bearings it \
+             does not. Most likely because interpolated bearings are wrong by much the same amount over half a metre, and a filter that takes \
+             a hundred of them a second for independent grows too sure",
             row.times_s.iter().flatten().count()
         ),
     }
