@@ -24,7 +24,7 @@ use crate::random::Seed;
 
 use describe::{Describer, Descriptor};
 use detect::{Criteria, Feature, Scratch};
-use matching::{Candidate, Choice, Gallery, View};
+use matching::{Candidate, Choice, Gallery, Seen, View};
 use motion::{Pair, PlanarMotion, Sight};
 use pyramid::Pyramid;
 
@@ -266,14 +266,9 @@ impl Extractor {
     /// Matches that fit one planar motion.
     fn match_features(&mut self, projection: &Projection) -> Vec<Choice> {
         let settings = &self.settings;
-        self.gallery.compare(
-            &self.now,
-            &self.descriptors,
-            horizon(projection),
-            settings.height_slack,
-            RUNNER_UP * settings.distance,
-            &mut self.candidates,
-        );
+        let seen = Seen { features: &self.now, descriptors: &self.descriptors, horizon: horizon(projection) };
+        let limit = RUNNER_UP * settings.distance;
+        matching::compare(&self.gallery, seen, settings.height_slack, limit, &mut self.candidates);
         let home = View { features: &self.home, width: self.home_projection.width as f32 };
         let now = View { features: &self.now, width: projection.width as f32 };
         let sights: Vec<Sight> = self.now.iter().map(|f| sight(f, projection, settings)).collect();
