@@ -97,7 +97,10 @@ impl Describer {
 }
 
 /// The descriptor of the grid around `centre` with the given steps (x, y), in pixels of the image.
-#[multiversion::multiversion(targets("x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"))]
+#[multiversion::multiversion(targets(
+    "x86_64+avx512f+avx512bw+avx512dq+avx512vl+avx2+bmi1+bmi2+lzcnt+popcnt",
+    "x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"
+))]
 fn histogram(weights: &Weights, image: &Image<u16>, centre: (f32, f32), step: (f32, f32)) -> Descriptor {
     let patch = cut(image, centre, step);
     // Rows first: each row of samples counts for the cell rows next to it.

@@ -152,22 +152,32 @@ impl Scratch {
         self.low.resize(width + 2, 0);
         // Buffers serve layers of all widths: what a wider one left behind the last column must not be found.
         self.mask.clear();
-        self.mask.resize(width.next_multiple_of(8), 0);
+        self.mask.resize(width.next_multiple_of(64), 0);
         self.mask[width..].fill(0);
         mark_extremes(rows, threshold, &mut self.high, &mut self.low, &mut self.mask);
         self.found.clear();
-        for (k, eight) in self.mask.as_chunks::<8>().0.iter().enumerate() {
-            let mut marks = u64::from_le_bytes(*eight);
-            while marks != 0 {
-                self.found.push(8 * k + (marks.trailing_zeros() / 8) as usize);
-                marks &= marks - 1;
+        for (k, block) in self.mask.as_chunks::<64>().0.iter().enumerate() {
+            let words: &[[u8; 8]; 8] = bytemuck::cast_ref(block);
+            let words = words.map(u64::from_le_bytes);
+            if words.iter().fold(0, |any, word| any | word) == 0 {
+                continue; // most are
+            }
+            for (j, word) in words.iter().enumerate() {
+                let mut marks = *word;
+                while marks != 0 {
+                    self.found.push(64 * k + 8 * j + (marks.trailing_zeros() / 8) as usize);
+                    marks &= marks - 1;
+                }
             }
         }
     }
 }
 
 /// The vectorised part of `Scratch::find`.
-#[multiversion::multiversion(targets("x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"))]
+#[multiversion::multiversion(targets(
+    "x86_64+avx512f+avx512bw+avx512dq+avx512vl+avx2+bmi1+bmi2+lzcnt+popcnt",
+    "x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"
+))]
 fn mark_extremes(rows: [&[i16]; 3], threshold: i16, high: &mut [i16], low: &mut [i16], mask: &mut [u8]) {
     let [above, row, below] = rows;
     let width = row.len();

@@ -119,7 +119,10 @@ pub(super) struct Seen<'a> {
 /// Compares the current features with those home features that may be the same, which agree in height over size to within
 /// `slack` (an absolute and a relative part). Candidates come grouped by current feature; those with a distance above `limit`
 /// are left out.
-#[multiversion::multiversion(targets("x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"))]
+#[multiversion::multiversion(targets(
+    "x86_64+avx512f+avx512bw+avx512dq+avx512vl+avx2+bmi1+bmi2+lzcnt+popcnt",
+    "x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"
+))]
 pub(super) fn compare(gallery: &Gallery, seen: Seen<'_>, slack: (f32, f32), limit: f32, candidates: &mut Vec<Candidate>) {
     let distance = |a: &Descriptor, b: &Descriptor| {
         match_target! {

@@ -158,7 +158,10 @@ impl Pyramid {
 }
 
 /// Grey levels in sixteenths.
-#[multiversion::multiversion(targets("x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"))]
+#[multiversion::multiversion(targets(
+    "x86_64+avx512f+avx512bw+avx512dq+avx512vl+avx2+bmi1+bmi2+lzcnt+popcnt",
+    "x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"
+))]
 fn luma(rgba: &[u8], luma: &mut [u16]) {
     for (luma, p) in luma.iter_mut().zip(rgba.as_chunks::<4>().0) {
         let p = u32::from_le_bytes(*p);
@@ -168,7 +171,10 @@ fn luma(rgba: &[u8], luma: &mut [u16]) {
 }
 
 /// Convolves with the binomial (1 4 6 4 1) / 16 both ways: variance 1.
-#[multiversion::multiversion(targets("x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"))]
+#[multiversion::multiversion(targets(
+    "x86_64+avx512f+avx512bw+avx512dq+avx512vl+avx2+bmi1+bmi2+lzcnt+popcnt",
+    "x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"
+))]
 fn blur(source: &Image<u16>, target: &mut Image<u16>, line: &mut Vec<u16>) {
     let (width, height) = (source.width, source.height);
     target.resize(width, height);
@@ -223,7 +229,10 @@ fn halve(source: &Image<u16>, target: &mut Image<u16>) {
     }
 }
 
-#[multiversion::multiversion(targets("x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"))]
+#[multiversion::multiversion(targets(
+    "x86_64+avx512f+avx512bw+avx512dq+avx512vl+avx2+bmi1+bmi2+lzcnt+popcnt",
+    "x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"
+))]
 fn subtract(coarse: &Image<u16>, fine: &Image<u16>, target: &mut Image<i16>) {
     target.resize(coarse.width, coarse.height);
     for y in 0..coarse.height {
