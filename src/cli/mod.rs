@@ -11,6 +11,7 @@ mod home;
 mod physics_report;
 mod render;
 mod robustness;
+mod vision_report;
 mod world;
 
 use anyhow::Result;
@@ -37,6 +38,7 @@ pub fn run(args: Args) -> Result<Verdict> {
         Command::Robustness(args) => robustness::run(&args, &context),
         Command::Bound(args) => bound::run(&args, &context),
         Command::Render(args) => render::run(&args, &context),
+        Command::VisionReport(args) => vision_report::run(&args, &context),
         Command::World(args) => world::run(&args, &context),
     }
 }

@@ -67,6 +67,8 @@ pub struct Setup {
     pub renderer: RendererChoice,
     /// Columns and rows of the panorama where they differ from the world's.
     pub size_px: Option<(u32, u32)>,
+    /// What makes bearings of panoramas, for [`Bearings::Rendered`].
+    pub extractor: ExtractorSettings,
     /// Faults of [`Bearings::Noisy`].
     pub noise: Noise,
     /// What is done to the bearings of any sensor on top of that.
@@ -88,6 +90,7 @@ impl Default for Setup {
             law: LawKind::Proportional,
             renderer: RendererChoice::Auto,
             size_px: None,
+            extractor: ExtractorSettings::default(),
             noise: Noise::default(),
             degradation: Degradation::default(),
             start: Start::Random,
@@ -195,7 +198,7 @@ impl<'a> Bench<'a> {
                 &camera.scene,
                 camera.renderer.as_mut(),
                 setup.projection(world),
-                ExtractorSettings::default(),
+                setup.extractor.clone(),
             )?),
             None if setup.bearings == Bearings::Noisy => {
                 Box::new(NoisySensor::new(ideal(), world.landmark_count, setup.noise, seed))

@@ -15,6 +15,7 @@ pub mod robustness;
 pub mod run;
 pub mod seeds;
 pub mod text;
+pub mod vision;
 
 pub use folder::{OutputFolder, write_atomically};
 

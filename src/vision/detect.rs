@@ -27,7 +27,7 @@ pub(super) struct Feature {
 }
 
 /// Finds the features of a pyramid and keeps the strongest, spread over azimuth and scale, in an order that depends on the
-/// picture only. Returns the strength below which no feature had a chance to be kept.
+/// picture only. Returns the strength below which no feature had a chance to be kept: 0 if none was too weak.
 pub(super) fn detect(pyramid: &Pyramid, criteria: &Criteria, scratch: &mut Scratch, features: &mut Vec<Feature>) -> f32 {
     features.clear();
     let layers = 2 * pyramid.octaves.len();
