@@ -44,7 +44,7 @@ pub fn write(mut folder: OutputFolder, study: &VisionStudy, command: &str, outsi
     }
     if let (Some(table), Some(text)) = (&table, outside) {
         folder.write(OUTSIDE, text.as_bytes())?;
-        folder.write("opencv.svg", table.chart(study).to_svg().as_bytes())?;
+        folder.write("opencv.svg", table.chart().to_svg().as_bytes())?;
     }
     folder.write("README.md", page(study, command, table.as_ref()).as_bytes())?;
     folder.finish()

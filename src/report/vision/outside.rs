@@ -74,15 +74,13 @@ impl Outside {
     }
 
     /// Right matches over distance in the first world.
-    pub fn chart(&self, study: &VisionStudy) -> Chart {
+    pub fn chart(&self) -> Chart {
         let world = self.rows.first().map_or("", |r| r.world.as_str());
         let mut chart = Chart::new(
             format!("Right matches in {world}, by method"),
             ChartAxis::linear("distance from home (m)"),
             ChartAxis::log("right matches a panorama"),
         );
-        let own = super::of(study, world, Axis::Distance).map(|c| [c.level, c.right]);
-        chart = chart.line(own, &Stroke::EXACT, &format!("wayhome in this report, {} keypoints", study.keypoints));
         for (k, method) in self.methods().into_iter().enumerate() {
             let rows = self.rows.iter().filter(|r| r.method == method && r.world == world);
             let points: Vec<[f64; 2]> = rows.map(|r| [r.distance_m, r.right]).collect();
@@ -99,7 +97,8 @@ impl Outside {
                         ([`opencv.csv`](opencv.csv), made by `tests/outside/opencv_features.py` with `opencv-python-headless`), scored by the same \
                         rule: ratio test at 0.8, mutual nearest neighbours, the strip padded cyclically, one thread. OpenCV has no geometric \
                         check here; wayhome's is part of it. Cells are right matches a panorama and, in brackets, precision. Times are those \
-                        of one machine, medians of processor time; wayhome's matching is part of its extraction.\n\n"
+                        of one machine under load, medians: processor time for OpenCV, the clock for wayhome, which has its matching \
+                        in the first number.\n\n"
             .to_owned();
         let distances: Vec<f64> = Axis::Distance.levels().to_vec();
         let _ = write!(text, "| world | method | keypoints |");
