@@ -75,6 +75,8 @@ fn bad_values_are_usage_errors() {
     assert_fails(&home(&["--noise-deg", "1"]), 2, &["--bearings noisy"]);
     assert_fails(&home(&["--bearings", "ideal", "--size", "64x32"]), 2, &["--bearings rendered"]);
     assert_fails(&home(&["--bearings", "ideal", "--start", "nowhere"]), 2, &["nowhere"]);
+    assert_fails(&home(&["--light", "dusk"]), 2, &["--light", "evening"]);
+    assert_fails(&home(&["--bearings", "ideal", "--home-camera", "cheap"]), 2, &["--bearings rendered"]);
     assert_fails(&run(folder.path(), &[]), 2, &["Usage"]);
     assert!(!folder.path().join("results").exists(), "a failure leaves no folder behind");
 }
@@ -204,7 +206,9 @@ fn a_seed_gives_the_same_bytes_on_any_number_of_threads() {
         let path = folder.path().join(out);
         (std::fs::read(path.join("trajectory.csv")).unwrap(), summary(&path))
     };
-    for sensor in [&["--bearings", "noisy"][..], &["--bearings", "rendered", "--size", "720x90"]] {
+    let cheap =
+        ["--bearings", "rendered", "--size", "720x90", "--camera", "cheap", "--light", "evening", "--home-light", "day"];
+    for sensor in [&["--bearings", "noisy"][..], &["--bearings", "rendered", "--size", "720x90"], &cheap] {
         let first = files(sensor, "1", "a");
         assert!(first.0.len() > 1000, "a trajectory of some steps");
         assert_eq!(first, files(sensor, "1", "a"), "a second time, in the same folder");
@@ -297,6 +301,34 @@ fn a_panorama_comes_with_its_truth() {
 }
 
 #[test]
+fn light_and_camera_change_colours_and_nothing_else() {
+    let folder = tempfile::tempdir().unwrap();
+    let render = |more: &[&str]| {
+        let common = ["render", "gallery", "--pose", "2.6,3.4,20", "--size", "256x48", "--renderer", "cpu", "--out", "view"];
+        assert_done(&run(folder.path(), &[&common, more].concat()));
+        ["rgb.png", "range.png", "instance.png", "meta.json"]
+            .map(|file| std::fs::read(folder.path().join("view").join(file)).unwrap())
+    };
+    let plain = render(&["--camera", "ideal"]);
+    let mut seen = vec![plain[0].clone()];
+    for look in [
+        &["--camera", "cheap"][..],
+        &["--camera", "cheap", "--seed", "1"],
+        &["--camera", "dirty"],
+        &["--light", "night", "--camera", "night"],
+        &["--light", "glare"],
+    ] {
+        let [rgb, range, instance, meta] = render(look);
+        assert!(!seen.contains(&rgb), "{look:?}: a look of its own");
+        assert!(range == plain[1] && instance == plain[2], "{look:?}: truth stays exact");
+        let meta: Value = serde_json::from_slice(&meta).unwrap();
+        assert_eq!(meta[look[0].trim_start_matches('-')], look[1]);
+        seen.push(rgb);
+    }
+    assert!(render(&["--camera", "cheap", "--seed", "1"])[0] == seen[2], "the same seed, the same noise");
+}
+
+#[test]
 fn worlds_can_be_checked_drawn_and_described() {
     let folder = tempfile::tempdir().unwrap();
     let check = run(folder.path(), &["world", "check", LAB]);
@@ -340,6 +372,10 @@ fn a_table_of_commands_is_driven_and_recorded() {
     assert_eq!((number(last, "t_s"), summary["time_s"].as_f64()), (3.05, Some(3.05)));
     let drift = (number(last, "x_odom_m") - number(last, "x_m")).hypot(number(last, "y_odom_m") - number(last, "y_m"));
     assert!((summary["odometry_drift_m"].as_f64().unwrap() - drift).abs() < 1e-12 && drift > 0.0);
+    // Every collision is in a table of its own, with time, body and impulse.
+    let hits = std::fs::read_to_string(folder.path().join("first/collisions.csv")).unwrap();
+    assert_eq!(hits.lines().next(), Some("t_s,with,impulse_n_s"));
+    assert_eq!(hits.lines().count() - 1, summary["collisions"].as_u64().unwrap() as usize);
     // Forces over an interval make the momentum gained in it: here straight ahead, from rest.
     let mass = 2.3;
     let force: f64 = ["left", "right", "caster"].iter().map(|w| number(&rows[2], &format!("force_{w}_forward_n"))).sum();
@@ -353,4 +389,20 @@ fn a_table_of_commands_is_driven_and_recorded() {
     }
     assert_fails(&run(folder.path(), &["drive", LAB]), 2, &["--commands"]);
     assert!(!folder.path().join("results").exists(), "a failure leaves no folder behind");
+}
+
+#[test]
+fn the_physics_report_holds_its_closed_forms() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = run(folder.path(), &["physics-report", "--json", "--out", "page"]);
+    assert_done(&output);
+    let printed: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let page = std::fs::read_to_string(folder.path().join("page/README.md")).unwrap();
+    for form in printed["closed_forms"].as_array().unwrap() {
+        let (difference, allowed) = (form["greatest_difference"].as_f64().unwrap(), form["allowed"].as_f64().unwrap());
+        assert!(difference <= allowed, "{form}");
+        let drawing = format!("{}.svg", form["name"].as_str().unwrap());
+        assert!(page.contains(&drawing) && folder.path().join("page").join(&drawing).is_file(), "{drawing}");
+    }
+    assert!(page.contains("| 0 rises |"), "{page}");
 }

@@ -7,7 +7,7 @@ use anyhow::Result;
 use serde::Serialize;
 use wayhome::Error;
 use wayhome::episode::sensor::Noise;
-use wayhome::episode::{Bearings, Bench, Outcome, Setup, Summary};
+use wayhome::episode::{Bearings, Bench, Look, Outcome, Setup, Summary};
 use wayhome::report::{OutputFolder, run as run_report, seeds as seeds_report, text};
 use wayhome::study::seeds::{SeedEvent, SeedsSummary, run_seeds};
 use wayhome::vision::ExtractorSettings;
@@ -94,6 +94,8 @@ fn setup(args: &HomeArgs) -> Result<Setup, Error> {
     needs_bearings(noisy, "--noise-*", args.bearings, Bearings::Noisy)?;
     needs_bearings(args.size.is_some(), "--size", args.bearings, Bearings::Rendered)?;
     needs_bearings(args.landmarks.is_some(), "--landmarks", args.bearings, Bearings::Rendered)?;
+    let (look, home_look) = (args.look.look(), Look { light: args.home_light, camera: args.home_camera });
+    needs_bearings(look.or(home_look) != Look::default(), "--light and --camera", args.bearings, Bearings::Rendered)?;
     let usual = Noise::default();
     let mut extractor = ExtractorSettings::default();
     extractor.landmarks = args.landmarks.unwrap_or(extractor.landmarks);
@@ -105,6 +107,8 @@ fn setup(args: &HomeArgs) -> Result<Setup, Error> {
         renderer: args.renderer,
         size_px: args.size,
         extractor,
+        look,
+        home_look,
         noise: Noise {
             sd_rad: args.noise_deg.map_or(usual.sd_rad, f64::to_radians),
             dropout: args.noise_dropout.unwrap_or(usual.dropout),

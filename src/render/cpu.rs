@@ -261,7 +261,7 @@ fn shade_planes(band: &Band<'_>, rows: &[Row], columns: Range<usize>, tile: &mut
                     plane = (one, Plane::new(band.scene, band.frame, one >> 2, one == code(one >> 2, Face::Underside)));
                 }
                 let t = distances[start];
-                let shaded = plane.1.shade(band.scene, band.frame, &directions, t, row.inverse_tan, start..end);
+                let shaded = plane.1.shade(band.scene, band.frame, &directions, t, row, start..end);
                 colours[start..end].copy_from_slice(&shaded[start..end]);
             }
             start = end;

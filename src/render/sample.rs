@@ -13,7 +13,7 @@ use super::scene::Material;
 
 /// Most pixels sampled at once.
 pub(super) const RUN: usize = 64;
-/// Most texels along v that a run of rows covers on a level: less than two a row, for [`level`] sees to that.
+/// Most texels along v that a run of rows covers on a level: less than two a row, for [`strip_footprint`] sees to that.
 const REACH: usize = 2 * RUN + 8;
 /// Adding this rounds a number of magnitude below 2^22 to a whole one, which then stands in the low bits.
 const ROUNDER: f32 = 12_582_912.0;
@@ -24,24 +24,42 @@ pub(super) fn round(x: f32) -> i32 {
     ((x + ROUNDER).to_bits() as i32).wrapping_sub(ROUNDER.to_bits() as i32)
 }
 
-/// Level of detail, in 1/256 of a level, for a pixel that covers `a_m` by `b_m` of the surface.
+/// What a pixel covers of an upright surface, in texels along the axis that counts: `u_m` by `v_m`.
 ///
 /// The texture is filtered the same along both axes. Taking the long side would blur surfaces that are seen at a flat angle,
-/// the short side would let them flicker; half the long side is the compromise. The logarithm is read off the bits of the
+/// the short side would let them flicker; half the long side is the compromise.
+#[inline(always)]
+pub(super) fn footprint(material: &Material, [u_m, v_m]: [f32; 2]) -> f32 {
+    let (u, v) = (u_m * material.texels_per_m[0], v_m * material.texels_per_m[1]);
+    (0.5 * u.max(v)).max(u.min(v))
+}
+
+/// The same where u is seen at a slant and v is not, and [`REACH`] asks that v is never undersampled.
+#[inline(always)]
+pub(super) fn strip_footprint(material: &Material, [u_m, v_m]: [f32; 2]) -> f32 {
+    (0.5 * (u_m * material.texels_per_m[0])).max(v_m * material.texels_per_m[1])
+}
+
+/// Level of detail, in 1/256 of a level, for a pixel that covers so many texels. The logarithm is read off the bits of the
 /// number, linear between powers of two: the same on all machines.
 #[inline(always)]
-pub(super) fn level(material: &Material, a_m: f32, b_m: f32) -> i32 {
-    let footprint = (0.5 * a_m.max(b_m)).max(a_m.min(b_m)) * material.texels_per_m;
+pub(super) fn level(material: &Material, footprint: f32) -> i32 {
     let logarithm = (footprint.to_bits() as i32 - 1.0_f32.to_bits() as i32) >> 15;
     logarithm.clamp(0, 256 * material.log2_size as i32)
 }
 
-/// A length on a surface in texels, less whole periods.
+/// A length on a surface in texels, less whole periods, along u (`axis` 0) or v (1).
 #[inline(always)]
-pub(super) fn within_tile(length_m: f32, material: &Material) -> f32 {
+pub(super) fn within_tile(length_m: f32, material: &Material, axis: usize) -> f32 {
     let size = (1_u32 << material.log2_size) as f32;
-    let texels = length_m * material.texels_per_m;
+    let texels = length_m * material.texels_per_m[axis];
     texels - size * libm::floorf(texels / size)
+}
+
+/// The same as a coordinate.
+#[inline(always)]
+pub(super) fn coordinate(length_m: f32, material: &Material, axis: usize) -> i32 {
+    (within_tile(length_m, material, axis) * 65536.0) as i32
 }
 
 /// Index in the atlas of the first texel of a level.
@@ -89,15 +107,15 @@ pub(super) struct Strip {
 }
 
 impl Strip {
-    /// `u_m`, and `v_m` at row 0 of the picture; v falls by `step_m` a row. `level` comes from [`level`] with `step_m` as the
-    /// shorter of the two lengths.
+    /// `u_m`, and `v_m` at row 0 of the picture; v falls by `step_m` a row. `level` comes from [`strip_footprint`] with `step_m`
+    /// along v.
     #[inline(always)]
     pub fn new(material: &Material, u_m: f32, v_m: f32, step_m: f32, level: i32) -> Self {
         Self {
             material: *material,
-            u: (within_tile(u_m, material) * 65536.0) as i32,
-            v: (within_tile(v_m, material) * 65536.0) as i32,
-            step: (step_m * material.texels_per_m * -65536.0) as i32,
+            u: coordinate(u_m, material, 0),
+            v: coordinate(v_m, material, 1),
+            step: (step_m * material.texels_per_m[1] * -65536.0) as i32,
             level,
         }
     }

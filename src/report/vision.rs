@@ -61,7 +61,7 @@ pub fn csv(study: &VisionStudy) -> String {
     let mut text = format!("{COLUMNS}\n");
     let number = |value: Option<f64>| value.map_or_else(String::new, |v| v.to_string());
     for c in &study.cells {
-        let _ = write!(text, "{},{},{},{},", c.world, c.axis.name(), c.level, c.panoramas);
+        let _ = write!(text, "{},{},{},{},", c.world, c.axis.name(), c.label, c.panoramas);
         let _ = write!(text, "{},{},{},{},{},", c.repeatability, c.matches, c.right, c.least_right, c.precision);
         let _ = write!(text, "{},{},{},{}", c.wrong, c.wrong_same_instance, c.wrong_near, c.wrong_wild);
         let spreads = [
@@ -98,12 +98,19 @@ fn title(axis: Axis) -> &'static str {
         Axis::Gamma => "exponent on the grey levels",
         Axis::Noise => "noise (sd, grey levels)",
         Axis::Occlusion => "share of the turn that is hidden (%)",
+        Axis::Light => "light",
+        Axis::Camera => "camera",
     }
 }
 
 /// A level in the unit of the title.
 fn shown(axis: Axis, level: f64) -> f64 {
     if axis == Axis::Occlusion { 100.0 * level } else { level }
+}
+
+/// A level as a table shows it.
+fn name(cell: &Cell) -> String {
+    if cell.axis == Axis::Occlusion { shown(cell.axis, cell.level).to_string() } else { cell.label.clone() }
 }
 
 /// A chart of one line a world.
@@ -170,17 +177,17 @@ fn errors(study: &VisionStudy) -> Chart {
 #[must_use]
 pub fn table(study: &VisionStudy) -> String {
     let mut text = format!(
-        "{:10} {:9} {:>6} {:>5} {:>7} {:>7} {:>7} {:>7} {:>8} {:>8} {:>7} {:>7}\n",
+        "{:10} {:9} {:>8} {:>5} {:>7} {:>7} {:>7} {:>7} {:>8} {:>8} {:>7} {:>7}\n",
         "world", "axis", "level", "shots", "repeat%", "matches", "right", "prec%", "med deg", "95% deg", "68% sd", "95% sd"
     );
     for c in &study.cells {
         let number = |value: Option<f64>, decimals: usize| value.map_or_else(|| "-".to_owned(), |v| format!("{v:.decimals$}"));
         let _ = writeln!(
             text,
-            "{:10} {:9} {:>6} {:>5} {:>7.1} {:>7.1} {:>7.1} {:>7.1} {:>8} {:>8} {:>7} {:>7}",
+            "{:10} {:9} {:>8} {:>5} {:>7.1} {:>7.1} {:>7.1} {:>7.1} {:>8} {:>8} {:>7} {:>7}",
             c.world,
             c.axis.name(),
-            c.level,
+            name(c),
             c.panoramas,
             100.0 * c.repeatability,
             c.matches,
@@ -236,6 +243,8 @@ fn heading(axis: Axis) -> &'static str {
         Axis::Gamma => "Contrast",
         Axis::Noise => "Image noise",
         Axis::Occlusion => "Occlusion",
+        Axis::Light => "Light",
+        Axis::Camera => "Camera",
     }
 }
 
@@ -246,6 +255,10 @@ fn explanation(axis: Axis) -> &'static str {
         Axis::Rotation => "1 m from home, turned by this much since home, in degrees.",
         Axis::Gain => "1 m from home; all grey levels times this factor, clipped at white. The home panorama is as it was.",
         Axis::Gamma => "1 m from home; grey levels of 0 to 1 to this power. The home panorama is as it was.",
+        Axis::Light => {
+            "1 m from home, which was seen by day: the light presets of the worlds. Where a room has no windows, `glare` is `day`."
+        }
+        Axis::Camera => "1 m from home, which was seen through the ideal camera: the camera presets, the robot at rest.",
         Axis::Noise => {
             "1 m from home; normal noise of this standard deviation, in grey levels of 255, on each channel of each pixel, in the \
              home panorama too."
@@ -276,7 +289,7 @@ fn axis_table(study: &VisionStudy, axis: Axis) -> String {
             text,
             "| {} | {} | {} | {:.1} | {:.1} | {:.1} ({}) | {:.1} | {} | {} | {} |",
             c.world,
-            shown(axis, c.level),
+            name(c),
             c.panoramas,
             100.0 * c.repeatability,
             c.matches,

@@ -5,6 +5,7 @@ use serde::Serialize;
 
 use crate::panorama::Panorama;
 use crate::random::{Stream, standard_normal};
+use crate::world::{CameraPreset, LightPreset};
 
 /// One condition is changed at a time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -22,11 +23,34 @@ pub enum Axis {
     Noise,
     /// Share of the turn that is hidden by things which were not there.
     Occlusion,
+    /// Light of the world, by its presets.
+    Light,
+    /// Camera, by its presets.
+    Camera,
 }
+
+/// Light presets and their names, the home panorama's first.
+const LIGHTS: [(LightPreset, &str); 5] = [
+    (LightPreset::Day, "day"),
+    (LightPreset::Overcast, "overcast"),
+    (LightPreset::Glare, "glare"),
+    (LightPreset::Evening, "evening"),
+    (LightPreset::Night, "night"),
+];
+
+/// Camera presets and their names, the home panorama's first.
+const CAMERAS: [(CameraPreset, &str); 5] = [
+    (CameraPreset::Ideal, "ideal"),
+    (CameraPreset::Decent, "decent"),
+    (CameraPreset::Cheap, "cheap"),
+    (CameraPreset::Dirty, "dirty"),
+    (CameraPreset::Night, "night"),
+];
 
 impl Axis {
     /// All, in the order of the report.
-    pub const ALL: [Self; 6] = [Self::Distance, Self::Rotation, Self::Gain, Self::Gamma, Self::Noise, Self::Occlusion];
+    pub const ALL: [Self; 8] =
+        [Self::Distance, Self::Rotation, Self::Gain, Self::Gamma, Self::Light, Self::Noise, Self::Camera, Self::Occlusion];
 
     /// Name in files.
     #[must_use]
@@ -38,10 +62,23 @@ impl Axis {
             Self::Gamma => "gamma",
             Self::Noise => "noise",
             Self::Occlusion => "occlusion",
+            Self::Light => "light",
+            Self::Camera => "camera",
         }
     }
 
-    /// The levels that are measured.
+    /// What a level is called: a name or a number.
+    #[must_use]
+    pub fn label(self, level: f64) -> String {
+        let name = match self {
+            Self::Light => LIGHTS.get(level as usize).map(|(_, name)| *name),
+            Self::Camera => CAMERAS.get(level as usize).map(|(_, name)| *name),
+            _ => None,
+        };
+        name.map_or_else(|| level.to_string(), str::to_owned)
+    }
+
+    /// The levels that are measured. Those that have names are counted.
     #[must_use]
     pub fn levels(self) -> &'static [f64] {
         match self {
@@ -51,6 +88,7 @@ impl Axis {
             Self::Gamma => &[0.5, 0.7, 1.0, 1.4, 2.0],
             Self::Noise => &[0.0, 2.0, 5.0, 10.0, 20.0],
             Self::Occlusion => &[0.0, 0.1, 0.3, 0.5, 0.7],
+            Self::Light | Self::Camera => &[0.0, 1.0, 2.0, 3.0, 4.0],
         }
     }
 }
@@ -66,11 +104,16 @@ pub struct Condition {
     pub noise: f64,
     /// Share of the turn that is hidden.
     pub occlusion: f64,
+    /// Light in which the panorama is rendered.
+    pub light: LightPreset,
+    /// Camera through which it is taken.
+    pub camera: CameraPreset,
 }
 
 impl Condition {
     /// As it is.
-    pub const CLEAR: Self = Self { gain: 1.0, gamma: 1.0, noise: 0.0, occlusion: 0.0 };
+    pub const CLEAR: Self =
+        Self { gain: 1.0, gamma: 1.0, noise: 0.0, occlusion: 0.0, light: LightPreset::Day, camera: CameraPreset::Ideal };
 
     /// The condition at a level of an axis.
     #[must_use]
@@ -81,10 +124,12 @@ impl Condition {
             Axis::Gamma => Self { gamma: level, ..Self::CLEAR },
             Axis::Noise => Self { noise: level, ..Self::CLEAR },
             Axis::Occlusion => Self { occlusion: level, ..Self::CLEAR },
+            Axis::Light => Self { light: LIGHTS[(level as usize).min(LIGHTS.len() - 1)].0, ..Self::CLEAR },
+            Axis::Camera => Self { camera: CAMERAS[(level as usize).min(CAMERAS.len() - 1)].0, ..Self::CLEAR },
         }
     }
 
-    /// Makes of a clear panorama what is seen under this condition. What is hidden loses its range and instance.
+    /// Makes of a rendered panorama what is seen under this condition; light and camera are there already. What is hidden loses its range and instance.
     pub fn apply(&self, panorama: &mut Panorama, stream: &mut Stream) {
         if self.occlusion > 0.0 {
             hide(panorama, self.occlusion, stream);

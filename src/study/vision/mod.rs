@@ -1,7 +1,7 @@
 //! How good is the extractor? Repeatability, matching precision and bearing errors against the renderer's range and instance.
 //!
 //! Panoramas are taken around home, and the renderer's range says where each home feature must appear in them. One condition at
-//! a time is changed: distance, turn, light, noise, what stands in between. The truth scores; the extractor sees colours only.
+//! a time is changed: distance, turn, light, noise, camera, what stands in between. The truth scores; the extractor sees colours only.
 
 pub mod conditions;
 pub mod score;
@@ -19,7 +19,7 @@ use crate::observation::HomeSnapshot;
 use crate::panorama::Panorama;
 use crate::physics::{Plant, RapierPlant};
 use crate::random::Seed;
-use crate::render::{CpuRenderer, Renderer, Scene, View};
+use crate::render::{Camera, CpuRenderer, Scene, View};
 use crate::vision::{Extractor, ExtractorSettings, Landmarks};
 use crate::world::World;
 use conditions::{Axis, Condition};
@@ -54,6 +54,8 @@ pub struct Cell {
     pub axis: Axis,
     /// How far.
     pub level: f64,
+    /// What the level is called.
+    pub label: String,
     /// Panoramas.
     pub panoramas: usize,
     /// Share of the visible home features that are found as features.
@@ -184,6 +186,7 @@ fn cell(world: &World, axis: Axis, level: f64, score: &Score) -> Cell {
         world: world.spec.name.clone(),
         axis,
         level,
+        label: axis.label(level),
         panoramas: score.panoramas,
         repeatability: score.repeatability(),
         matches: per_panorama(score.matches),
@@ -229,8 +232,9 @@ impl Eyes {
 impl<'a> Studio<'a> {
     fn new(world: &'a World, settings: &'a VisionSettings) -> Result<Self> {
         let scene = Scene::new(world)?;
-        let panorama = render(&scene, world, world.home, &world.body_poses())?;
-        Ok(Self { world, settings, scene, home: Shot { panorama, pose: world.home } })
+        let clear = Sight { scene: &scene, world, condition: Condition::CLEAR };
+        let home = clear.shoot(world.home, &world.body_poses(), Seed(settings.seed).derive("vision/home"))?;
+        Ok(Self { world, settings, scene, home })
     }
 
     /// Panoramas around home, with the numbers of their places: as far off and turned as the level says, else 1 m off and turned
@@ -259,9 +263,12 @@ impl<'a> Studio<'a> {
                 views.push((k, pose, bodies.to_vec()));
             }
         }
-        let shots = views
-            .into_par_iter()
-            .map(|(k, pose, bodies)| Ok((k, Shot { panorama: render(&self.scene, world, pose, &bodies)?, pose })));
+        let condition = Condition::at(axis, level);
+        let scene = self.scene.under(condition.light, condition.camera.optics().exposure);
+        let sight = Sight { scene: &scene, world, condition };
+        let noise = Seed(self.settings.seed).derive(&format!("vision/{}/{level}", axis.name()));
+        let shots =
+            views.into_par_iter().map(|(k, pose, bodies)| Ok((k, sight.shoot(pose, &bodies, noise.derive(&k.to_string()))?)));
         shots.collect()
     }
 
@@ -296,9 +303,21 @@ impl<'a> Studio<'a> {
     }
 }
 
-fn render(scene: &Scene, world: &World, robot: Pose, bodies: &[Pose]) -> Result<Panorama> {
-    let projection = world.projection();
-    let mut panorama = Panorama::black(projection);
-    CpuRenderer::new().render(scene, &View { projection, robot, bodies }, &mut panorama)?;
-    Ok(panorama)
+/// A room, its light, and a camera.
+struct Sight<'a> {
+    scene: &'a Scene,
+    world: &'a World,
+    condition: Condition,
+}
+
+impl Sight<'_> {
+    /// Takes a panorama from where the robot stands still.
+    fn shoot(&self, robot: Pose, bodies: &[Pose], noise: Seed) -> Result<Shot> {
+        let projection = self.world.projection();
+        let mut panorama = Panorama::black(projection);
+        let view = View { projection, robot, bodies };
+        let mut camera = Camera::new(self.condition.camera.optics());
+        camera.take(&mut CpuRenderer::new(), self.scene, &view, Twist::default(), noise, &mut panorama)?;
+        Ok(Shot { panorama, pose: self.world.camera_pose(&robot) })
+    }
 }

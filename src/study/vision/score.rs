@@ -17,7 +17,7 @@ const RIGHT_SCALE: f64 = 1.5;
 pub struct Shot {
     /// What was seen.
     pub panorama: Panorama,
-    /// Pose of the robot in the room.
+    /// Pose of the camera in the room.
     pub pose: Pose,
 }
 
