@@ -11,6 +11,8 @@ use wayhome::geometry::Pose;
 use wayhome::render::RendererChoice;
 use wayhome::report::paper::Target;
 use wayhome::study::robustness::Axis;
+use wayhome::study::vision::conditions::Axis as VisionAxis;
+use wayhome::vision::Landmarks;
 use wayhome::world::{CameraPreset, LightPreset};
 
 /// Shown under every `--help`.
@@ -85,6 +87,9 @@ pub enum Command {
     /// Cramer-Rao bound of range, bearing and heading along a path, and the filter's errors beside it
     #[command(after_help = EXIT_CODES)]
     Bound(BoundArgs),
+    /// Hold the extractor against ground truth: a page of tables and charts
+    #[command(after_help = EXIT_CODES)]
+    VisionReport(VisionReportArgs),
     /// Render one panorama with range and instance ids
     #[command(after_help = EXIT_CODES)]
     Render(RenderArgs),
@@ -110,6 +115,9 @@ pub struct HomeArgs {
     /// Steering law of the methods that estimate where home is
     #[arg(long, default_value = "proportional", value_parser = choice(LAWS))]
     pub controller: LawKind,
+    /// What a landmark of rendered bearings is [default: features]
+    #[arg(long, value_parser = choice(LANDMARKS))]
+    pub landmarks: Option<Landmarks>,
     /// What renders
     #[arg(long, default_value = "auto", value_parser = choice(RENDERERS))]
     pub renderer: RendererChoice,
@@ -262,6 +270,29 @@ pub struct BoundArgs {
     pub every_s: f64,
 }
 
+/// Arguments of `vision-report`.
+#[derive(Debug, clap::Args)]
+pub struct VisionReportArgs {
+    /// World files, or names of built-in worlds
+    #[arg(default_values_t = ["lab".to_owned(), "slippery".to_owned(), "crowd".to_owned()], value_name = "WORLD")]
+    pub worlds: Vec<String>,
+    /// What is changed; several are separated by commas [default: all]
+    #[arg(long, value_name = "AXIS", value_delimiter = ',', value_parser = choice(VISION_AXES))]
+    pub axis: Vec<VisionAxis>,
+    /// Most features kept of a panorama, 16 to 10000 [default: the extractor's]
+    #[arg(long, value_name = "N", value_parser = keypoints)]
+    pub keypoints: Option<usize>,
+    /// Seed of walkers, noise and what hides
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub seed: u64,
+    /// Folder, new or empty, for the panoramas of the distance axis, which tests/outside/opencv_features.py reads
+    #[arg(long, value_name = "DIR")]
+    pub pairs: Option<PathBuf>,
+    /// Folder for the page; what other detectors made of the same pairs is shown if it lies there
+    #[arg(long, value_name = "DIR", default_value = "results/vision")]
+    pub out: PathBuf,
+}
+
 /// Arguments of `render`.
 #[derive(Debug, clap::Args)]
 pub struct RenderArgs {
@@ -347,6 +378,22 @@ pub const RENDERERS: &[Choice<RendererChoice>] = &[
     (RendererChoice::Cpu, "cpu", "The CPU"),
 ];
 
+const LANDMARKS: &[Choice<Landmarks>] = &[
+    (Landmarks::Features, "features", "Each feature of the panorama by itself"),
+    (Landmarks::Objects, "objects", "Neighbouring features clustered, the centre of the cluster the bearing"),
+];
+
+const VISION_AXES: &[Choice<VisionAxis>] = &[
+    (VisionAxis::Distance, "distance", "Distance from home, 0.25 to 3 m"),
+    (VisionAxis::Rotation, "rotation", "Turn since home, 0 to 180 degrees"),
+    (VisionAxis::Gain, "gain", "Factor on the grey levels, 0.25 to 2"),
+    (VisionAxis::Gamma, "gamma", "Exponent on the grey levels, 0.5 to 2"),
+    (VisionAxis::Noise, "noise", "Image noise, 0 to 20 grey levels"),
+    (VisionAxis::Occlusion, "occlusion", "Share of the turn that is hidden, 0 to 70 %"),
+    (VisionAxis::Light, "light", "The world's light presets"),
+    (VisionAxis::Camera, "camera", "The camera presets"),
+];
+
 const LIGHTS: &[Choice<LightPreset>] = &[
     (LightPreset::Day, "day", "As the world has it"),
     (LightPreset::Overcast, "overcast", "Rain outside, lamps off"),
@@ -415,6 +462,15 @@ pub fn renderer_name(renderer: RendererChoice) -> &'static str {
     name_of(RENDERERS, &renderer)
 }
 
+/// A word as a shell takes it.
+pub fn quoted(word: &str) -> String {
+    if word.chars().all(|c| c.is_ascii_alphanumeric() || "-_./,:=".contains(c)) {
+        word.to_owned()
+    } else {
+        format!("'{}'", word.replace('\'', r"'\''"))
+    }
+}
+
 /// A finite number.
 pub fn number(text: &str) -> Result<f64, String> {
     text.trim().parse().ok().filter(|v: &f64| v.is_finite()).ok_or_else(|| format!("`{text}` is not a finite number"))
@@ -447,6 +503,11 @@ fn start(text: &str) -> Result<Start, String> {
         _ if text.contains(',') => pose(text).map(Start::At),
         _ => Ok(Start::Named(text.to_owned())),
     }
+}
+
+fn keypoints(text: &str) -> Result<usize, String> {
+    let count = text.parse().ok().filter(|n| (16..=10_000).contains(n));
+    count.ok_or_else(|| "allowed are 16 to 10000 features".into())
 }
 
 /// `WxH` in pixels.
@@ -498,6 +559,8 @@ mod tests {
         check(METHODS);
         check(LAWS);
         check(AXES);
+        check(LANDMARKS);
+        check(VISION_AXES);
         check(LIGHTS);
         check(CAMERAS);
         assert!(LightPreset::ALL.iter().all(|one| LIGHTS.iter().any(|(light, ..)| light == one)));

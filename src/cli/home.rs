@@ -10,6 +10,7 @@ use wayhome::episode::sensor::Noise;
 use wayhome::episode::{Bearings, Bench, Look, Outcome, Setup, Summary};
 use wayhome::report::{OutputFolder, run as run_report, seeds as seeds_report, text};
 use wayhome::study::seeds::{SeedEvent, SeedsSummary, run_seeds};
+use wayhome::vision::ExtractorSettings;
 use wayhome::world::World;
 
 use super::Verdict;
@@ -92,9 +93,12 @@ fn setup(args: &HomeArgs) -> Result<Setup, Error> {
     let noisy = args.noise_deg.is_some() || args.noise_dropout.is_some() || args.noise_false.is_some();
     needs_bearings(noisy, "--noise-*", args.bearings, Bearings::Noisy)?;
     needs_bearings(args.size.is_some(), "--size", args.bearings, Bearings::Rendered)?;
+    needs_bearings(args.landmarks.is_some(), "--landmarks", args.bearings, Bearings::Rendered)?;
     let (look, home_look) = (args.look.look(), Look { light: args.home_light, camera: args.home_camera });
     needs_bearings(look.or(home_look) != Look::default(), "--light and --camera", args.bearings, Bearings::Rendered)?;
     let usual = Noise::default();
+    let mut extractor = ExtractorSettings::default();
+    extractor.landmarks = args.landmarks.unwrap_or(extractor.landmarks);
     Ok(Setup {
         plant: args.plant,
         bearings: args.bearings,
@@ -102,6 +106,7 @@ fn setup(args: &HomeArgs) -> Result<Setup, Error> {
         law: args.controller,
         renderer: args.renderer,
         size_px: args.size,
+        extractor,
         look,
         home_look,
         noise: Noise {

@@ -14,6 +14,7 @@ mod physics_report;
 mod render;
 mod reproduce;
 mod robustness;
+mod vision_report;
 mod world;
 
 use anyhow::Result;
@@ -43,6 +44,7 @@ pub fn run(args: Args) -> Result<Verdict> {
         Command::Observability(args) => observability::run(&args, &context),
         Command::Reproduce(args) => reproduce::run(&args, &context),
         Command::Render(args) => render::run(&args, &context),
+        Command::VisionReport(args) => vision_report::run(&args, &context),
         Command::World(args) => world::run(&args, &context),
     }
 }

@@ -11,7 +11,7 @@ use wayhome::study::seeds::SeedEvent;
 use wayhome::world::World;
 
 use super::Verdict;
-use super::args::{RobustnessArgs, bearings_name, law_name, method_name, renderer_name};
+use super::args::{RobustnessArgs, bearings_name, law_name, method_name, quoted, renderer_name};
 use super::context::{Context, default_folder};
 use super::home::needs_bearings;
 
@@ -83,13 +83,4 @@ fn command(args: &RobustnessArgs) -> String {
         flag("out", out.display().to_string());
     }
     words.join(" ")
-}
-
-/// A word as a shell takes it.
-fn quoted(word: &str) -> String {
-    if word.chars().all(|c| c.is_ascii_alphanumeric() || "-_./,:=".contains(c)) {
-        word.to_owned()
-    } else {
-        format!("'{}'", word.replace('\'', r"'\''"))
-    }
 }

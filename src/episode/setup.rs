@@ -110,6 +110,8 @@ pub struct Setup {
     pub renderer: RendererChoice,
     /// Columns and rows of the panorama where they differ from the world's.
     pub size_px: Option<(u32, u32)>,
+    /// What makes bearings of panoramas, for [`Bearings::Rendered`].
+    pub extractor: ExtractorSettings,
     /// Light and camera, for [`Bearings::Rendered`].
     pub look: Look,
     /// Light and camera of the home panorama; what is `None` is as in `look`.
@@ -140,6 +142,7 @@ impl Default for Setup {
             law: LawKind::Proportional,
             renderer: RendererChoice::Auto,
             size_px: None,
+            extractor: ExtractorSettings::default(),
             look: Look::default(),
             home_look: Look::default(),
             noise: Noise::default(),
@@ -282,7 +285,7 @@ impl<'a> Bench<'a> {
                 let [home_look, look] = setup.looks();
                 let sights =
                     [Sight { scene: home, optics: home_look.optics(world) }, Sight { scene: now, optics: look.optics(world) }];
-                let (projection, settings) = (setup.projection(world), ExtractorSettings::default());
+                let (projection, settings) = (setup.projection(world), setup.extractor.clone());
                 Box::new(RenderedSensor::new(world, sights, renderer.as_mut(), projection, settings, seed)?)
             }
             None if setup.bearings == Bearings::Noisy => {

@@ -17,6 +17,7 @@ pub mod robustness;
 pub mod run;
 pub mod seeds;
 pub mod text;
+pub mod vision;
 
 pub use folder::{GrowingFile, OutputFolder, write_atomically};
 

@@ -8,3 +8,4 @@ pub mod physics;
 pub mod robustness;
 pub mod seeds;
 pub mod statistics;
+pub mod vision;

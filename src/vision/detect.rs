@@ -27,7 +27,7 @@ pub(super) struct Feature {
 }
 
 /// Finds the features of a pyramid and keeps the strongest, spread over azimuth and scale, in an order that depends on the
-/// picture only. Returns the strength below which no feature had a chance to be kept.
+/// picture only. Returns the strength below which no feature had a chance to be kept: 0 if none was too weak.
 pub(super) fn detect(pyramid: &Pyramid, criteria: &Criteria, scratch: &mut Scratch, features: &mut Vec<Feature>) -> f32 {
     features.clear();
     let layers = 2 * pyramid.octaves.len();
@@ -51,23 +51,23 @@ impl<'a> Neighbour<'a> {
         Self { image: &other.difference[layer % 2], ratio_x: own.step_x / other.step_x, ratio_y: own.step_y / other.step_y }
     }
 
-    /// Value in grey levels at (x, y) of the scanned layer.
+    /// Value in units at (x, y) of the scanned layer.
     fn sample(&self, x: f32, y: f32) -> f32 {
-        self.image.sample(x * self.ratio_x, y * self.ratio_y) * (1.0 / UNITS)
+        self.image.sample(x * self.ratio_x, y * self.ratio_y)
     }
 
-    /// Whether `value`, at row `y` and the middle one of three columns, lies further from 0 than this layer at and beside
-    /// that place.
-    fn topped_by(&self, value: f32, [left, x, right]: [usize; 3], y: usize) -> bool {
+    /// Whether `value`, in units, at row `y` and the middle one of three columns, lies further from 0 than this layer at and
+    /// beside that place.
+    fn topped_by(&self, value: i16, [left, x, right]: [usize; 3], y: usize) -> bool {
         let sign = value.signum();
-        let least = sign * value;
         if self.ratio_x == 1.0 {
-            let at = |x: usize, y: usize| sign * f32::from(self.image.row(y)[x]) < UNITS * least;
+            let at = |x: usize, y: usize| sign * self.image.row(y)[x] < sign * value;
             return at(x, y) && at(left, y) && at(right, y) && at(x, y - 1) && at(x, y + 1);
         }
         let (x, y) = (x as f32, y as f32);
+        let (sign, value) = (f32::from(sign), f32::from(value));
         let cross = [(0.0, 0.0), (-1.0, 0.0), (1.0, 0.0), (0.0, -1.0), (0.0, 1.0)];
-        cross.iter().all(|(dx, dy)| sign * self.sample(x + dx, y + dy) < least)
+        cross.iter().all(|(dx, dy)| sign * self.sample(x + dx, y + dy) < sign * value)
     }
 }
 
@@ -93,16 +93,21 @@ fn scan(pyramid: &Pyramid, layer: usize, criteria: &Criteria, scratch: &mut Scra
     let coarser = Neighbour::new(pyramid, layer + 1, layer);
     // The finest layer has none below it: what is smallest there may be smaller still, and is taken as it is.
     let finer = (layer > 0).then(|| Neighbour::new(pyramid, layer - 1, layer));
+    // One of the two lies in the same octave. It is asked first, since it needs no interpolation.
+    let (first, last) = if layer % 2 == 0 { (Some(&coarser), finer.as_ref()) } else { (finer.as_ref(), Some(&coarser)) };
     for y in 1..height - 1 {
         let rows = [image.row(y - 1), image.row(y), image.row(y + 1)];
         scratch.find(rows, criteria.contrast);
         for &x in &scratch.found {
-            let (left, right) = (if x == 0 { width - 1 } else { x - 1 }, if x + 1 == width { 0 } else { x + 1 });
-            let patch = rows.map(|row| [row[left], row[x], row[right]].map(|v| f32::from(v) * (1.0 / UNITS)));
+            let columns = [if x == 0 { width - 1 } else { x - 1 }, x, if x + 1 == width { 0 } else { x + 1 }];
+            let value = rows[1][x];
+            let tops = |layer: Option<&Neighbour>| layer.is_none_or(|layer| layer.topped_by(value, columns, y));
+            if !tops(first) {
+                continue;
+            }
+            let patch = rows.map(|row| columns.map(|x| f32::from(row[x])));
             let Some((dx, dy, peak, looseness)) = refine(&patch, criteria.edge_ratio) else { continue };
-            let value = patch[1][1];
-            let columns = [left, x, right];
-            if !coarser.topped_by(value, columns, y) || finer.as_ref().is_some_and(|f| !f.topped_by(value, columns, y)) {
+            if !tops(last) {
                 continue;
             }
             let (xr, yr) = (x as f32 + dx, y as f32 + dy);
@@ -120,7 +125,7 @@ fn scan(pyramid: &Pyramid, layer: usize, criteria: &Criteria, scratch: &mut Scra
                 sigma,
                 octave: layer / 2,
                 level: layer % 2,
-                response: peak,
+                response: peak * (1.0 / UNITS),
                 looseness,
             });
         }
@@ -141,37 +146,56 @@ impl Scratch {
     /// neighbours, or below both the negative threshold and all neighbours; of equal neighbours the left or upper one counts.
     /// Written as plain loops over whole rows, which vectorise; few pixels are left for the costlier tests.
     fn find(&mut self, rows: [&[i16]; 3], threshold: f32) {
-        let [above, row, below] = rows;
-        let width = row.len();
+        let width = rows[1].len();
         let threshold = (threshold * UNITS) as i16;
         self.high.resize(width + 2, 0);
         self.low.resize(width + 2, 0);
         // Buffers serve layers of all widths: what a wider one left behind the last column must not be found.
         self.mask.clear();
-        self.mask.resize(width.next_multiple_of(8), 0);
+        self.mask.resize(width.next_multiple_of(64), 0);
         self.mask[width..].fill(0);
-        // Extremes of each column's three pixels, with a copy of the other end on either side.
-        let columns = above.iter().zip(row).zip(below);
-        for ((high, low), ((a, b), c)) in self.high[1..=width].iter_mut().zip(&mut self.low[1..=width]).zip(columns) {
-            *high = (*a).max(*b).max(*c);
-            *low = (*a).min(*b).min(*c);
-        }
-        (self.high[0], self.high[width + 1]) = (self.high[width], self.high[1]);
-        (self.low[0], self.low[width + 1]) = (self.low[width], self.low[1]);
-        let high = self.high[..width].iter().zip(&self.high[2..]);
-        let low = self.low[..width].iter().zip(&self.low[2..]);
-        let columns = above.iter().zip(row).zip(below);
-        for (((mask, (h0, h1)), (l0, l1)), ((a, b), c)) in self.mask.iter_mut().zip(high).zip(low).zip(columns) {
-            let top = (*b > (*h0).max(*a).max(threshold)) & (*b >= (*h1).max(*c));
-            let bottom = (*b < (*l0).min(*a).min(-threshold)) & (*b <= (*l1).min(*c));
-            *mask = u8::from(top | bottom);
-        }
+        mark_extremes(rows, threshold, &mut self.high, &mut self.low, &mut self.mask);
         self.found.clear();
-        for (k, eight) in self.mask.as_chunks::<8>().0.iter().enumerate() {
-            if u64::from_ne_bytes(*eight) != 0 {
-                self.found.extend((0..8).filter(|&i| eight[i] != 0).map(|i| 8 * k + i));
+        for (k, block) in self.mask.as_chunks::<64>().0.iter().enumerate() {
+            let words: &[[u8; 8]; 8] = bytemuck::cast_ref(block);
+            let words = words.map(u64::from_le_bytes);
+            if words.iter().fold(0, |any, word| any | word) == 0 {
+                continue; // most are
+            }
+            for (j, word) in words.iter().enumerate() {
+                let mut marks = *word;
+                while marks != 0 {
+                    self.found.push(64 * k + 8 * j + (marks.trailing_zeros() / 8) as usize);
+                    marks &= marks - 1;
+                }
             }
         }
+    }
+}
+
+/// The vectorised part of `Scratch::find`.
+#[multiversion::multiversion(targets(
+    "x86_64+avx512f+avx512bw+avx512dq+avx512vl+avx2+bmi1+bmi2+lzcnt+popcnt",
+    "x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"
+))]
+fn mark_extremes(rows: [&[i16]; 3], threshold: i16, high: &mut [i16], low: &mut [i16], mask: &mut [u8]) {
+    let [above, row, below] = rows;
+    let width = row.len();
+    // Extremes of each column's three pixels, with a copy of the other end on either side.
+    let columns = above.iter().zip(row).zip(below);
+    for ((high, low), ((a, b), c)) in high[1..=width].iter_mut().zip(&mut low[1..=width]).zip(columns) {
+        *high = (*a).max(*b).max(*c);
+        *low = (*a).min(*b).min(*c);
+    }
+    (high[0], high[width + 1]) = (high[width], high[1]);
+    (low[0], low[width + 1]) = (low[width], low[1]);
+    let high = high[..width].iter().zip(&high[2..]);
+    let low = low[..width].iter().zip(&low[2..]);
+    let columns = above.iter().zip(row).zip(below);
+    for (((mask, (h0, h1)), (l0, l1)), ((a, b), c)) in mask.iter_mut().zip(high).zip(low).zip(columns) {
+        let top = (*b > (*h0).max(*a).max(threshold)) & (*b >= (*h1).max(*c));
+        let bottom = (*b < (*l0).min(*a).min(-threshold)) & (*b <= (*l1).min(*c));
+        *mask = u8::from(top | bottom);
     }
 }
 

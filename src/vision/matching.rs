@@ -1,9 +1,15 @@
 //! Descriptor matching between the home panorama and the current one.
 //!
 //! The camera keeps its height, so a landmark's elevation and its scale change together: rows above the horizon over scale is
-//! the landmark's height over its size, wherever it is seen from. Only features that agree in this number are compared at
-//! all, which saves most of the work and many wrong matches.
+//! the landmark's height over its size, wherever it is seen from. And what is brighter than its surroundings stays so. Only
+//! features that agree in both are compared at all, which saves most of the work and many wrong matches.
 
+use std::ops::Range;
+
+use multiversion::target::match_target;
+
+#[cfg(target_arch = "x86_64")]
+use super::describe::distance_avx2;
 use super::describe::{Descriptor, UNRELATED, distance};
 use super::detect::Feature;
 
@@ -27,10 +33,12 @@ pub(super) struct Choice {
     pub ratio: f32,
 }
 
-/// The home features, ready to be compared: sorted by height over size.
+/// The home features, ready to be compared: the dark ones, then the bright ones, each sorted by height over size.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Gallery {
     entries: Vec<Entry>,
+    /// Number of dark ones.
+    dark: usize,
     plain: Vec<Descriptor>,
     /// Horizontally stretched descriptors, `variants` of each feature.
     stretched: Vec<Descriptor>,
@@ -39,6 +47,7 @@ pub(super) struct Gallery {
 
 #[derive(Debug, Clone, Copy)]
 struct Entry {
+    bright: bool,
     height_over_size: f32,
     sigma: f32,
     feature: usize,
@@ -49,8 +58,16 @@ fn height_over_size(feature: &Feature, horizon: f32) -> f32 {
     (horizon - feature.y) / feature.sigma
 }
 
+/// Whether a feature is brighter than its surroundings.
+fn is_bright(feature: &Feature) -> bool {
+    feature.response < 0.0
+}
+
 /// Largest change of scale between two sightings of a landmark.
 const ZOOM: f32 = 4.5;
+/// A plain descriptor this many times as far off as the limit is not worth stretching: that brings nearer what is related, not
+/// what is unrelated.
+const HOPELESS: f32 = 1.3;
 
 impl Gallery {
     /// Describes every feature once plain and once for each of `stretches` by `describe(feature, stretch)`. `horizon` is the row of
@@ -59,51 +76,79 @@ impl Gallery {
         let mut entries: Vec<_> = features
             .iter()
             .enumerate()
-            .map(|(k, f)| Entry { height_over_size: height_over_size(f, horizon), sigma: f.sigma, feature: k })
+            .map(|(k, f)| Entry {
+                bright: is_bright(f),
+                height_over_size: height_over_size(f, horizon),
+                sigma: f.sigma,
+                feature: k,
+            })
             .collect();
-        entries.sort_by(|a, b| a.height_over_size.total_cmp(&b.height_over_size).then(a.feature.cmp(&b.feature)));
+        let by_height = |a: &Entry, b: &Entry| a.height_over_size.total_cmp(&b.height_over_size);
+        entries.sort_by(|a, b| a.bright.cmp(&b.bright).then_with(|| by_height(a, b)).then(a.feature.cmp(&b.feature)));
+        let dark = entries.partition_point(|e| !e.bright);
         let plain = entries.iter().map(|e| describe(&features[e.feature], 1.0)).collect();
         let mut stretched = Vec::with_capacity(entries.len() * stretches.len());
         for entry in &entries {
             stretched.extend(stretches.iter().map(|s| describe(&features[entry.feature], *s)));
         }
-        Self { entries, plain, stretched, variants: stretches.len() }
+        Self { entries, dark, plain, stretched, variants: stretches.len() }
     }
 
-    /// Compares the current features with those home features that agree in height over size to within `slack` (an absolute
-    /// and a relative part). Candidates come grouped by current feature; those with a distance above `limit` are left out.
-    pub fn compare(
-        &self,
-        now: &[Feature],
-        descriptors: &[Descriptor],
-        horizon: f32,
-        slack: (f32, f32),
-        limit: f32,
-        candidates: &mut Vec<Candidate>,
-    ) {
-        candidates.clear();
-        // Stretching brings what is related nearer, not what is unrelated.
-        let hopeless = (1.3 * limit * UNRELATED) as u32;
-        let limit = (limit * UNRELATED) as u32;
-        for (n, (feature, descriptor)) in now.iter().zip(descriptors).enumerate() {
-            let height = height_over_size(feature, horizon);
-            let reach = slack.0 + slack.1 * height.abs();
-            let from = self.entries.partition_point(|e| e.height_over_size < height - reach);
-            let to = self.entries.partition_point(|e| e.height_over_size <= height + reach);
-            for (k, (entry, plain)) in self.entries[from..to].iter().zip(&self.plain[from..to]).enumerate() {
-                if feature.sigma > ZOOM * entry.sigma || entry.sigma > ZOOM * feature.sigma {
-                    continue;
-                }
-                let mut best = distance(descriptor, plain);
-                if best > hopeless {
-                    continue;
-                }
-                for variant in &self.stretched[(from + k) * self.variants..][..self.variants] {
-                    best = best.min(distance(descriptor, variant));
-                }
-                if best <= limit {
-                    candidates.push(Candidate { now: n, home: entry.feature, distance: best as f32 / UNRELATED });
-                }
+    /// Home features that agree in brightness with `feature`, and in height over size to within `slack` (an absolute and a
+    /// relative part).
+    fn alike(&self, feature: &Feature, horizon: f32, slack: (f32, f32)) -> Range<usize> {
+        let height = height_over_size(feature, horizon);
+        let reach = slack.0 + slack.1 * height.abs();
+        let (start, class) =
+            if is_bright(feature) { (self.dark, &self.entries[self.dark..]) } else { (0, &self.entries[..self.dark]) };
+        let from = start + class.partition_point(|e| e.height_over_size < height - reach);
+        let to = start + class.partition_point(|e| e.height_over_size <= height + reach);
+        from..to
+    }
+}
+
+/// The features of the current panorama as they are compared.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Seen<'a> {
+    pub features: &'a [Feature],
+    pub descriptors: &'a [Descriptor],
+    /// Row of the horizon.
+    pub horizon: f32,
+}
+
+/// Compares the current features with those home features that may be the same, which agree in height over size to within
+/// `slack` (an absolute and a relative part). Candidates come grouped by current feature; those with a distance above `limit`
+/// are left out.
+#[multiversion::multiversion(targets(
+    "x86_64+avx512f+avx512bw+avx512dq+avx512vl+avx2+bmi1+bmi2+lzcnt+popcnt",
+    "x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"
+))]
+pub(super) fn compare(gallery: &Gallery, seen: Seen<'_>, slack: (f32, f32), limit: f32, candidates: &mut Vec<Candidate>) {
+    let distance = |a: &Descriptor, b: &Descriptor| {
+        match_target! {
+            "x86_64+avx2" => distance_avx2(a, b),
+            _ => distance(a, b),
+        }
+    };
+    candidates.clear();
+    let hopeless = (HOPELESS * limit * UNRELATED) as u32;
+    let limit = (limit * UNRELATED) as u32;
+    for (now, (feature, descriptor)) in seen.features.iter().zip(seen.descriptors).enumerate() {
+        let sizes = feature.sigma / ZOOM..=feature.sigma * ZOOM;
+        for k in gallery.alike(feature, seen.horizon, slack) {
+            let entry = &gallery.entries[k];
+            if !sizes.contains(&entry.sigma) {
+                continue;
+            }
+            let mut best = distance(descriptor, &gallery.plain[k]);
+            if best > hopeless {
+                continue;
+            }
+            for variant in &gallery.stretched[k * gallery.variants..][..gallery.variants] {
+                best = best.min(distance(descriptor, variant));
+            }
+            if best <= limit {
+                candidates.push(Candidate { now, home: entry.feature, distance: best as f32 / UNRELATED });
             }
         }
     }
@@ -168,4 +213,23 @@ pub(super) fn choose(
     choices.dedup_by_key(|c| c.candidate.home);
     choices.sort_by(|a, b| a.ratio.total_cmp(&b.ratio).then(a.candidate.home.cmp(&b.candidate.home)));
     choices
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Whatever instruction computes them, distances are sums of absolute differences.
+    #[test]
+    fn distances_sum_absolute_differences() {
+        let feature = Feature { x: 5.0, y: 3.0, sigma: 2.0, octave: 0, level: 0, response: 1.0, looseness: 1.0 };
+        let home: Descriptor = std::array::from_fn(|k| (37 * k % 251) as u8);
+        let now: Descriptor = std::array::from_fn(|k| (101 * k % 256) as u8);
+        let sum: i32 = home.iter().zip(&now).map(|(a, b)| (i32::from(*a) - i32::from(*b)).abs()).sum();
+        let gallery = Gallery::new(&[feature], &[], 0.0, |_, _| home);
+        let seen = Seen { features: &[feature], descriptors: &[now], horizon: 0.0 };
+        let mut candidates = Vec::new();
+        compare(&gallery, seen, (1.0, 0.0), 2.0 * sum as f32 / UNRELATED, &mut candidates);
+        assert_eq!(candidates, [Candidate { now: 0, home: 0, distance: sum as f32 / UNRELATED }]);
+    }
 }

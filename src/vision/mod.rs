@@ -4,7 +4,8 @@
 //! panorama that follows. Features are upright blobs in scale space (`pyramid`, `detect`), described by gradient
 //! histograms (`describe`), matched by descriptor distance (`matching`) and checked against the one planar motion
 //! that must explain them all (`motion`). Once that motion is known, matches that were too ambiguous at first are
-//! taken where they fit it, which is what keeps landmarks in sight far from home.
+//! taken where they fit it, which is what keeps landmarks in sight far from home. A landmark is a feature, or, by
+//! [`ExtractorSettings::landmarks`], an object on which several features lie (`objects`).
 //!
 //! Only azimuths leave this module: elevations, scales and the motion found serve to refuse wrong matches and are not
 //! handed on. SURF, which the homing literature uses, is not: this detector is an open one.
@@ -13,6 +14,7 @@ mod describe;
 mod detect;
 mod matching;
 mod motion;
+mod objects;
 mod pyramid;
 
 use serde::{Deserialize, Serialize};
@@ -24,9 +26,20 @@ use crate::random::Seed;
 
 use describe::{Describer, Descriptor};
 use detect::{Criteria, Feature, Scratch};
-use matching::{Candidate, Choice, Gallery, View};
+use matching::{Candidate, Choice, Gallery, Seen, View};
 use motion::{Pair, PlanarMotion, Sight};
+use objects::{Found, Objects, Place};
 use pyramid::Pyramid;
+
+/// What a landmark is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Landmarks {
+    /// Each feature is a landmark of its own: many, and each exact.
+    Features,
+    /// Features that lie together are one landmark, and the centre of them is its bearing: few.
+    Objects,
+}
 
 /// Settings of the extractor. The defaults suit 1440 x 180 pixels.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -63,6 +76,12 @@ pub struct ExtractorSettings {
     pub draws: usize,
     /// Fewest matches that make an observation: where fewer fit one motion, they do by chance and none is reported.
     pub least_matches: usize,
+    /// What a landmark is.
+    pub landmarks: Landmarks,
+    /// Features within this angle of one another make an object, rad.
+    pub object_radius_rad: f64,
+    /// Fewest features that make an object.
+    pub object_features: usize,
     /// Standard deviation of a bearing, pixels: a constant part.
     pub sd_px: f64,
     /// Standard deviation of a bearing: a part in proportion to scale (pixels a pixel) and to how loosely the shape of the
@@ -70,6 +89,9 @@ pub struct ExtractorSettings {
     pub sd_per_scale: f64,
     /// The same, in proportion to the descriptor distance as well: a landmark that looks different is seen from elsewhere.
     pub sd_per_scale_and_distance: f64,
+    /// What becomes of the variance of a match when its misfit is known: the share that it has if it fits the motion exactly,
+    /// and what each squared standard deviation of misfit adds. A feature that is off in height is off in azimuth too.
+    pub variance_by_misfit: (f64, f64),
     /// Standard deviation that the geometric check allows a feature's position, pixels: a constant part.
     pub check_px: f64,
     /// Standard deviation that the geometric check allows a feature's position: a part in proportion to scale.
@@ -96,9 +118,13 @@ impl Default for ExtractorSettings {
             guided_ratio: 0.95,
             draws: 300,
             least_matches: 16,
+            landmarks: Landmarks::Features,
+            object_radius_rad: 0.07,
+            object_features: 4,
             sd_px: 0.05,
             sd_per_scale: 0.02,
             sd_per_scale_and_distance: 0.8,
+            variance_by_misfit: (0.55, 1.0),
             check_px: 0.16,
             check_per_scale: 0.1,
             seed: 0,
@@ -112,10 +138,25 @@ impl ExtractorSettings {
     }
 }
 
+/// A feature of a panorama, as scoring needs it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Keypoint {
+    /// Column and row, pixels.
+    pub px: (f64, f64),
+    /// Scale, pixels.
+    pub scale_px: f64,
+}
+
+impl Keypoint {
+    fn of(feature: &Feature) -> Self {
+        Self { px: (f64::from(feature.x), f64::from(feature.y)), scale_px: f64::from(feature.sigma) }
+    }
+}
+
 /// A landmark of the home panorama found in the current one, with what scoring needs.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Match {
-    /// The landmark: index of the home feature.
+    /// Index of the home feature, which is the landmark where landmarks are features.
     pub id: LandmarkId,
     /// Column and row in the home panorama, pixels.
     pub home_px: (f64, f64),
@@ -127,6 +168,8 @@ pub struct Match {
     pub now_scale_px: f64,
     /// Descriptor distance, 0 (equal) to about 1 (unrelated).
     pub distance: f64,
+    /// How far the match lies off the one motion that explains all, in standard deviations that the geometric check allows.
+    pub misfit: f64,
     /// Standard deviation of the bearing in the home panorama, rad.
     pub home_sd_rad: f64,
     /// Standard deviation of the current bearing, rad.
@@ -145,6 +188,7 @@ pub struct Extractor {
     home: Vec<Feature>,
     home_sights: Vec<Sight>,
     gallery: Gallery,
+    objects: Option<Objects>,
     now: Vec<Feature>,
     descriptors: Vec<Descriptor>,
     candidates: Vec<Candidate>,
@@ -177,6 +221,10 @@ impl Extractor {
             describer.describe(&pyramid, feature, settings.cell, stretch)
         });
         let home_sights = features.iter().map(|f| sight(f, &projection, &settings)).collect();
+        let objects = (settings.landmarks == Landmarks::Objects).then(|| {
+            let places: Vec<Place> = features.iter().map(|f| place(f, &projection, &settings)).collect();
+            Objects::new(&places, settings.object_radius_rad, settings.object_features)
+        });
         Self {
             settings,
             criteria,
@@ -187,6 +235,7 @@ impl Extractor {
             home: features,
             home_sights,
             gallery,
+            objects,
             now: Vec::new(),
             descriptors: Vec::new(),
             candidates: Vec::new(),
@@ -194,9 +243,12 @@ impl Extractor {
         }
     }
 
-    /// One bearing per home feature; its id is the feature's index.
+    /// One bearing a landmark; the id of a feature is its index.
     #[must_use]
     pub fn home_snapshot(&self) -> HomeSnapshot {
+        if let Some(objects) = &self.objects {
+            return HomeSnapshot { bearings: objects.home().to_vec() };
+        }
         let bearings = self
             .home
             .iter()
@@ -214,16 +266,51 @@ impl Extractor {
     pub fn observe(&mut self, now: &Panorama) -> Vec<Bearing> {
         self.look(now);
         let projection = now.projection;
+        if let Some(objects) = &self.objects {
+            let found = |m: &Match| Found {
+                feature: m.id.0 as usize,
+                azimuth_rad: projection.azimuth(m.now_px.0),
+                sd_rad: (m.home_sd_rad * m.home_sd_rad + m.now_sd_rad * m.now_sd_rad).sqrt(),
+                zoom: m.now_scale_px / m.home_scale_px,
+            };
+            return objects.bearings(&self.matches.iter().map(found).collect::<Vec<_>>());
+        }
         self.matches
             .iter()
             .map(|m| Bearing { id: m.id, azimuth_rad: projection.azimuth(m.now_px.0), sd_rad: m.now_sd_rad })
             .collect()
     }
 
-    /// The matches behind the last observation, in the same order.
+    /// The feature matches behind the last observation, in the order of their ids.
     #[must_use]
     pub fn matches(&self) -> &[Match] {
         &self.matches
+    }
+
+    /// Features of the last panorama that was observed.
+    pub fn keypoints(&self) -> impl Iterator<Item = Keypoint> {
+        self.now.iter().map(Keypoint::of)
+    }
+
+    /// Features of the home panorama, in the order of their indices.
+    pub fn home_keypoints(&self) -> impl Iterator<Item = Keypoint> {
+        self.home.iter().map(Keypoint::of)
+    }
+
+    /// Indices of the home features that make the landmark `id`; empty where there is none.
+    #[must_use]
+    pub fn features_of(&self, id: LandmarkId) -> Vec<usize> {
+        let k = id.0 as usize;
+        match &self.objects {
+            Some(objects) => objects.members(k),
+            None => {
+                if k < self.home.len() {
+                    vec![k]
+                } else {
+                    Vec::new()
+                }
+            }
+        }
     }
 
     fn look(&mut self, now: &Panorama) {
@@ -233,8 +320,10 @@ impl Extractor {
         if choices.len() < self.settings.least_matches {
             return;
         }
-        for Choice { candidate, .. } in choices {
+        for (candidate, chi2) in choices {
             let (home, seen) = (&self.home[candidate.home], &self.now[candidate.now]);
+            let home_sd_rad = sd_rad(home, 0.0, &self.home_projection, &self.settings);
+            let sd_rad = sd_rad(seen, candidate.distance, &now.projection, &self.settings);
             self.matches.push(Match {
                 id: LandmarkId(candidate.home as u32),
                 home_px: (f64::from(home.x), f64::from(home.y)),
@@ -242,8 +331,9 @@ impl Extractor {
                 home_scale_px: f64::from(home.sigma),
                 now_scale_px: f64::from(seen.sigma),
                 distance: f64::from(candidate.distance),
-                home_sd_rad: sd_rad(home, 0.0, &self.home_projection, &self.settings),
-                now_sd_rad: sd_rad(seen, candidate.distance, &now.projection, &self.settings),
+                misfit: chi2.sqrt(),
+                home_sd_rad,
+                now_sd_rad: given_misfit(home_sd_rad, sd_rad, chi2, &self.settings),
             });
         }
         self.matches.sort_by_key(|m| m.id);
@@ -253,9 +343,9 @@ impl Extractor {
     fn find_features(&mut self, now: &Panorama) {
         let settings = &self.settings;
         self.pyramid.build(now, settings.octaves);
-        detect::detect(&self.pyramid, &self.criteria, &mut self.scratch, &mut self.now);
-        if self.now.len() < settings.features / 2 && self.criteria.contrast > settings.contrast {
-            // Far fewer than at home: a poorer view, or darker light.
+        let hopeless = detect::detect(&self.pyramid, &self.criteria, &mut self.scratch, &mut self.now);
+        if hopeless == 0.0 && self.criteria.contrast > settings.contrast {
+            // Fewer than compete for a place at home: a poorer view, or darker light.
             let all = Criteria { contrast: settings.contrast, ..self.criteria };
             detect::detect(&self.pyramid, &all, &mut self.scratch, &mut self.now);
         }
@@ -264,16 +354,11 @@ impl Extractor {
     }
 
     /// Matches that fit one planar motion.
-    fn match_features(&mut self, projection: &Projection) -> Vec<Choice> {
+    fn match_features(&mut self, projection: &Projection) -> Vec<(Candidate, f64)> {
         let settings = &self.settings;
-        self.gallery.compare(
-            &self.now,
-            &self.descriptors,
-            horizon(projection),
-            settings.height_slack,
-            RUNNER_UP * settings.distance,
-            &mut self.candidates,
-        );
+        let seen = Seen { features: &self.now, descriptors: &self.descriptors, horizon: horizon(projection) };
+        let limit = RUNNER_UP * settings.distance;
+        matching::compare(&self.gallery, seen, settings.height_slack, limit, &mut self.candidates);
         let home = View { features: &self.home, width: self.home_projection.width as f32 };
         let now = View { features: &self.now, width: projection.width as f32 };
         let sights: Vec<Sight> = self.now.iter().map(|f| sight(f, projection, settings)).collect();
@@ -290,12 +375,17 @@ impl Extractor {
             matching::choose(&self.candidates, home, now, settings.distance, settings.guided_ratio, fits)
         };
         let motion = motion::polish(&pairs(&guided(motion)), motion);
-        guided(motion)
+        let frame = motion.frame();
+        let chi2 = |c: &Candidate| frame.fit(&self.home_sights[c.home], &sights[c.now]).chi2;
+        guided(motion).into_iter().map(|c| (c.candidate, chi2(&c.candidate))).collect()
     }
 }
 
 /// Candidates are kept up to this many times the largest distance of a match, to serve as runners-up.
 const RUNNER_UP: f32 = 1.15;
+
+/// However well a match fits, so much of its variance stays.
+const LEAST_VARIANCE_SHARE: f64 = 0.2;
 
 /// Row of the horizon, counted from the centre of row 0.
 fn horizon(projection: &Projection) -> f32 {
@@ -310,6 +400,22 @@ fn sd_rad(feature: &Feature, distance: f32, projection: &Projection, settings: &
     let own = settings.sd_per_scale * size;
     let changed = settings.sd_per_scale_and_distance * f64::from(distance) * size;
     (settings.sd_px * settings.sd_px + own * own + changed * changed).sqrt() * projection.pixel_rad()
+}
+
+/// Standard deviation of a current azimuth once the match's misfit is known. What it says of both azimuths is put on the current
+/// one: the home bearing is stated once and for all.
+fn given_misfit(home_sd_rad: f64, sd_rad: f64, chi2: f64, settings: &ExtractorSettings) -> f64 {
+    let (share, gain) = settings.variance_by_misfit;
+    let (home, now) = (home_sd_rad * home_sd_rad, sd_rad * sd_rad);
+    ((home + now) * (share + gain * chi2) - home).max(LEAST_VARIANCE_SHARE * now).sqrt()
+}
+
+fn place(feature: &Feature, projection: &Projection, settings: &ExtractorSettings) -> Place {
+    Place {
+        azimuth_rad: projection.azimuth(f64::from(feature.x)),
+        tan: projection.tan_elevation(f64::from(feature.y)),
+        sd_rad: sd_rad(feature, 0.0, projection, settings),
+    }
 }
 
 fn sight(feature: &Feature, projection: &Projection, settings: &ExtractorSettings) -> Sight {

@@ -86,6 +86,9 @@ const REACH: f64 = 3.0;
 /// The same squared: the limit of `Fit::chi2`.
 const CHI2_LIMIT: f64 = REACH * REACH;
 
+/// Matches judged before asking whether to go on.
+const JUDGED_AT_ONCE: usize = 16;
+
 /// The sines and cosines that (1) is made of.
 struct Angles {
     /// sin(a* - d), cos(a* - d).
@@ -97,6 +100,7 @@ struct Angles {
 }
 
 impl Frame {
+    #[inline]
     fn angles(&self, home: &Sight, now: &Sight) -> Angles {
         let phi = Vector2::new(
             self.turn.x * now.unit.x - self.turn.y * now.unit.y,
@@ -110,6 +114,7 @@ impl Frame {
     }
 
     /// Residual of (1) and its variance.
+    #[inline]
     fn residual(angles: &Angles, home: &Sight, now: &Sight) -> (f64, f64) {
         let ((a, a_cos), (b, b_cos)) = (angles.home, angles.now);
         let error = now.tan * a - home.tan * b;
@@ -121,6 +126,7 @@ impl Frame {
 
     /// How a match fits this motion, and how it fits the opposite step with the same turn: residual and scale are the same,
     /// the sense is not.
+    #[inline]
     fn fit_both(&self, home: &Sight, now: &Sight) -> [Fit; 2] {
         let angles = self.angles(home, now);
         let (error, variance) = Self::residual(&angles, home, now);
@@ -135,6 +141,7 @@ impl Frame {
     }
 
     /// How a match fits this motion.
+    #[inline]
     pub fn fit(&self, home: &Sight, now: &Sight) -> Fit {
         self.fit_both(home, now)[0]
     }
@@ -167,15 +174,13 @@ pub(super) fn estimate(pairs: &[Pair], draws: usize, seed: Seed) -> Option<Plana
             continue;
         }
         for motion in solve(&pairs[i], &pairs[j]).into_iter().flatten() {
-            let (score, motion) = judge(pairs, motion);
-            if best.is_none_or(|(s, _)| score > s) {
-                let polished = judge(pairs, polish(pairs, motion));
-                let better = if polished.0 > score { polished } else { (score, motion) };
-                // Enough draws for several pairs of right matches, whose noise still varies.
-                let right = better.0 / pairs.len() as f64;
-                needed = ((12.0 / (right * right)) as usize).clamp(20, draws);
-                best = Some(better);
-            }
+            let least = best.map_or(0.0, |(score, _)| score);
+            let Some((score, motion)) = judge(pairs, motion, least) else { continue };
+            let better = judge(pairs, polish(pairs, motion), score).unwrap_or((score, motion));
+            // Enough draws for several pairs of right matches, whose noise still varies.
+            let right = better.0 / pairs.len() as f64;
+            needed = ((12.0 / (right * right)) as usize).clamp(20, draws);
+            best = Some(better);
         }
     }
     best.filter(|(score, _)| *score > 2.0).map(|(_, motion)| motion)
@@ -216,22 +221,30 @@ fn solve(first: &Pair, second: &Pair) -> [Option<PlanarMotion>; 2] {
     })
 }
 
-/// Support of a motion or of its opposite, whichever has more, and that motion.
-fn judge(pairs: &[Pair], motion: PlanarMotion) -> (f64, PlanarMotion) {
+/// Support of a motion or of its opposite, whichever has more, and that motion; `None` as soon as it is certain that neither
+/// has more than `least`.
+fn judge(pairs: &[Pair], motion: PlanarMotion, least: f64) -> Option<(f64, PlanarMotion)> {
     let frame = motion.frame();
-    let mut support = [0.0; 2];
-    for pair in pairs {
-        for (fit, support) in frame.fit_both(&pair.home, &pair.now).iter().zip(&mut support) {
-            if fit.is_good() {
-                *support += 1.0 - fit.chi2 / CHI2_LIMIT;
+    let mut support = [0.0_f64; 2];
+    let mut left = pairs.len();
+    for block in pairs.chunks(JUDGED_AT_ONCE) {
+        for pair in block {
+            for (fit, support) in frame.fit_both(&pair.home, &pair.now).iter().zip(&mut support) {
+                if fit.is_good() {
+                    *support += 1.0 - fit.chi2 / CHI2_LIMIT;
+                }
             }
         }
+        left -= block.len();
+        if support[0].max(support[1]) + left as f64 <= least {
+            return None;
+        }
     }
-    if support[0] >= support[1] {
+    Some(if support[0] >= support[1] {
         (support[0], motion)
     } else {
         (support[1], PlanarMotion { direction_rad: wrap(motion.direction_rad + PI), ..motion })
-    }
+    })
 }
 
 /// Least squares over the matches that fit, by a few damped Gauss-Newton steps. The first steps take in more of the matches: the

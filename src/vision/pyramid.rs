@@ -18,25 +18,54 @@ pub(super) const BASE_SIGMA: f32 = 1.0;
 /// Units of a pixel's value in one grey level of 255.
 pub(super) const UNITS: f32 = 16.0;
 
-/// A grey image whose columns are cyclic.
+/// Columns of the left end that rows are followed by.
+pub(super) const MARGIN: usize = 64;
+
+/// A grey image whose columns are cyclic. Each row is followed by a copy of its first columns, so that a piece of a row across
+/// the seam is a slice like any other.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Image<T> {
     pub width: usize,
     pub height: usize,
-    pub data: Vec<T>,
+    data: Vec<T>,
 }
 
 impl<T: Copy + Default + Into<f32>> Image<T> {
     fn resize(&mut self, width: usize, height: usize) {
         self.width = width;
         self.height = height;
-        self.data.resize(width * height, T::default());
+        self.data.resize((width + MARGIN) * height, T::default());
     }
 
     /// Row `y`.
     #[inline]
     pub fn row(&self, y: usize) -> &[T] {
-        &self.data[y * self.width..(y + 1) * self.width]
+        &self.row_and_margin(y)[..self.width]
+    }
+
+    /// Row `y`, followed by its first `MARGIN` columns again.
+    #[inline]
+    pub fn row_and_margin(&self, y: usize) -> &[T] {
+        &self.data[y * (self.width + MARGIN)..(y + 1) * (self.width + MARGIN)]
+    }
+
+    /// Row `y` to be written; its margin follows by [`Image::close`].
+    #[inline]
+    fn row_mut(&mut self, y: usize) -> &mut [T] {
+        let start = y * (self.width + MARGIN);
+        &mut self.data[start..start + self.width]
+    }
+
+    /// Fills the margin of row `y`.
+    #[inline]
+    fn close(&mut self, y: usize) {
+        let start = y * (self.width + MARGIN);
+        let row = &mut self.data[start..start + self.width + MARGIN];
+        let (row, margin) = row.split_at_mut(self.width);
+        // A narrow picture goes round more than once.
+        for part in margin.chunks_mut(row.len()) {
+            part.copy_from_slice(&row[..part.len()]);
+        }
     }
 
     /// Value between pixels: columns wrap, rows are clamped.
@@ -97,9 +126,8 @@ impl Pyramid {
     pub fn build(&mut self, panorama: &Panorama, octaves: usize) {
         let (width, height) = (panorama.projection.width as usize, panorama.projection.height as usize);
         self.luma.resize(width, height);
-        for (luma, p) in self.luma.data.iter_mut().zip(panorama.rgba.as_chunks::<4>().0) {
-            // BT.601 weights in 256ths; the sum fills 16 bits.
-            *luma = (77 * u16::from(p[0]) + 150 * u16::from(p[1]) + 29 * u16::from(p[2])) >> 4;
+        for (y, row) in panorama.rgba.chunks_exact(4 * width).enumerate() {
+            luma(row, self.luma.row_mut(y));
         }
         let wanted = (0..octaves.max(1)).take_while(|&o| o == 0 || (height >> o >= 16 && width >> o >= 64)).count();
         self.octaves.resize_with(wanted, Octave::default);
@@ -119,16 +147,34 @@ impl Pyramid {
                 }
             }
             let [g0, g1, g2] = &mut octave.gauss;
+            let [d0, d1] = &mut octave.difference;
             blur(g0, g1, &mut self.line);
+            subtract(g1, g0, d0);
             blur(g1, &mut octave.scratch, &mut self.line);
             blur(&octave.scratch, g2, &mut self.line);
-            subtract(g1, g0, &mut octave.difference[0]);
-            subtract(g2, g1, &mut octave.difference[1]);
+            subtract(g2, g1, d1);
         }
     }
 }
 
+/// Grey levels in sixteenths.
+#[multiversion::multiversion(targets(
+    "x86_64+avx512f+avx512bw+avx512dq+avx512vl+avx2+bmi1+bmi2+lzcnt+popcnt",
+    "x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"
+))]
+fn luma(rgba: &[u8], luma: &mut [u16]) {
+    for (luma, p) in luma.iter_mut().zip(rgba.as_chunks::<4>().0) {
+        let p = u32::from_le_bytes(*p);
+        // BT.601 weights in 256ths; the sum fills 16 bits.
+        *luma = ((77 * (p & 0xff) + 150 * (p >> 8 & 0xff) + 29 * (p >> 16 & 0xff)) >> 4) as u16;
+    }
+}
+
 /// Convolves with the binomial (1 4 6 4 1) / 16 both ways: variance 1.
+#[multiversion::multiversion(targets(
+    "x86_64+avx512f+avx512bw+avx512dq+avx512vl+avx2+bmi1+bmi2+lzcnt+popcnt",
+    "x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"
+))]
 fn blur(source: &Image<u16>, target: &mut Image<u16>, line: &mut Vec<u16>) {
     let (width, height) = (source.width, source.height);
     target.resize(width, height);
@@ -144,16 +190,17 @@ fn blur(source: &Image<u16>, target: &mut Image<u16>, line: &mut Vec<u16>) {
         line[1] = line[width + 1];
         line[width + 2] = line[2];
         line[width + 3] = line[3];
-        let out = &mut target.data[y * width..(y + 1) * width];
+        let out = target.row_mut(y);
         let (a, b, c, d, e) = (&line[..width], &line[1..=width], &line[2..width + 2], &line[3..width + 3], &line[4..]);
         for (((((out, a), b), c), d), e) in out.iter_mut().zip(a).zip(b).zip(c).zip(d).zip(e) {
             *out = binomial(*a, *b, *c, *d, *e);
         }
+        target.close(y);
     }
 }
 
 /// (1 4 6 4 1) / 16, rounded. At most 16 * 255 * 16 + 8 on the way: within 16 bits.
-#[inline]
+#[inline(always)]
 fn binomial(a: u16, b: u16, c: u16, d: u16, e: u16) -> u16 {
     (a + e + 4 * (b + d) + 6 * c + 8) >> 4
 }
@@ -166,7 +213,7 @@ fn halve(source: &Image<u16>, target: &mut Image<u16>) {
     let step = source.width as f32 / width as f32;
     for y in 0..target.height {
         let from = source.row(2 * y);
-        let to = &mut target.data[y * width..(y + 1) * width];
+        let to = target.row_mut(y);
         if even {
             for (to, from) in to.iter_mut().zip(from.chunks_exact(2)) {
                 *to = from[0];
@@ -178,13 +225,20 @@ fn halve(source: &Image<u16>, target: &mut Image<u16>) {
                 *to = (a + f * (b - a) + 0.5) as u16;
             }
         }
+        target.close(y);
     }
 }
 
+#[multiversion::multiversion(targets(
+    "x86_64+avx512f+avx512bw+avx512dq+avx512vl+avx2+bmi1+bmi2+lzcnt+popcnt",
+    "x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"
+))]
 fn subtract(coarse: &Image<u16>, fine: &Image<u16>, target: &mut Image<i16>) {
     target.resize(coarse.width, coarse.height);
-    for ((t, c), f) in target.data.iter_mut().zip(&coarse.data).zip(&fine.data) {
-        *t = c.wrapping_sub(*f) as i16;
+    for y in 0..coarse.height {
+        for ((t, c), f) in target.row_mut(y).iter_mut().zip(coarse.row(y)).zip(fine.row(y)) {
+            *t = c.wrapping_sub(*f) as i16;
+        }
     }
 }
 

@@ -1,0 +1,226 @@
+//! What panoramas are taken under: how far off, how turned, in what light, with what noise, behind what.
+
+use rand_pcg::rand_core::Rng;
+use serde::Serialize;
+
+use crate::panorama::Panorama;
+use crate::random::{Stream, standard_normal};
+use crate::world::{CameraPreset, LightPreset};
+
+/// One condition is changed at a time.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Axis {
+    /// Distance from home, m.
+    Distance,
+    /// Turn since home, degrees.
+    Rotation,
+    /// Factor on all grey levels, clipped at white.
+    Gain,
+    /// Exponent on all grey levels, white staying white.
+    Gamma,
+    /// Standard deviation of noise on each channel of each pixel, at home too, grey levels of 255.
+    Noise,
+    /// Share of the turn that is hidden by things which were not there.
+    Occlusion,
+    /// Light of the world, by its presets.
+    Light,
+    /// Camera, by its presets.
+    Camera,
+}
+
+/// Light presets and their names, the home panorama's first.
+const LIGHTS: [(LightPreset, &str); 5] = [
+    (LightPreset::Day, "day"),
+    (LightPreset::Overcast, "overcast"),
+    (LightPreset::Glare, "glare"),
+    (LightPreset::Evening, "evening"),
+    (LightPreset::Night, "night"),
+];
+
+/// Camera presets and their names, the home panorama's first.
+const CAMERAS: [(CameraPreset, &str); 5] = [
+    (CameraPreset::Ideal, "ideal"),
+    (CameraPreset::Decent, "decent"),
+    (CameraPreset::Cheap, "cheap"),
+    (CameraPreset::Dirty, "dirty"),
+    (CameraPreset::Night, "night"),
+];
+
+impl Axis {
+    /// All, in the order of the report.
+    pub const ALL: [Self; 8] =
+        [Self::Distance, Self::Rotation, Self::Gain, Self::Gamma, Self::Light, Self::Noise, Self::Camera, Self::Occlusion];
+
+    /// Name in files.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Distance => "distance",
+            Self::Rotation => "rotation",
+            Self::Gain => "gain",
+            Self::Gamma => "gamma",
+            Self::Noise => "noise",
+            Self::Occlusion => "occlusion",
+            Self::Light => "light",
+            Self::Camera => "camera",
+        }
+    }
+
+    /// What a level is called: a name or a number.
+    #[must_use]
+    pub fn label(self, level: f64) -> String {
+        let name = match self {
+            Self::Light => LIGHTS.get(level as usize).map(|(_, name)| *name),
+            Self::Camera => CAMERAS.get(level as usize).map(|(_, name)| *name),
+            _ => None,
+        };
+        name.map_or_else(|| level.to_string(), str::to_owned)
+    }
+
+    /// The levels that are measured. Those that have names are counted.
+    #[must_use]
+    pub fn levels(self) -> &'static [f64] {
+        match self {
+            Self::Distance => &[0.25, 0.5, 1.0, 2.0, 3.0],
+            Self::Rotation => &[0.0, 45.0, 90.0, 135.0, 180.0],
+            Self::Gain => &[0.25, 0.5, 0.7, 1.0, 1.4, 2.0],
+            Self::Gamma => &[0.5, 0.7, 1.0, 1.4, 2.0],
+            Self::Noise => &[0.0, 2.0, 5.0, 10.0, 20.0],
+            Self::Occlusion => &[0.0, 0.1, 0.3, 0.5, 0.7],
+            Self::Light | Self::Camera => &[0.0, 1.0, 2.0, 3.0, 4.0],
+        }
+    }
+}
+
+/// Conditions of a panorama, beside where it is taken.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Condition {
+    /// Factor on all grey levels.
+    pub gain: f64,
+    /// Exponent on all grey levels.
+    pub gamma: f64,
+    /// Standard deviation of noise, grey levels.
+    pub noise: f64,
+    /// Share of the turn that is hidden.
+    pub occlusion: f64,
+    /// Light in which the panorama is rendered.
+    pub light: LightPreset,
+    /// Camera through which it is taken.
+    pub camera: CameraPreset,
+}
+
+impl Condition {
+    /// As it is.
+    pub const CLEAR: Self =
+        Self { gain: 1.0, gamma: 1.0, noise: 0.0, occlusion: 0.0, light: LightPreset::Day, camera: CameraPreset::Ideal };
+
+    /// The condition at a level of an axis.
+    #[must_use]
+    pub fn at(axis: Axis, level: f64) -> Self {
+        match axis {
+            Axis::Distance | Axis::Rotation => Self::CLEAR,
+            Axis::Gain => Self { gain: level, ..Self::CLEAR },
+            Axis::Gamma => Self { gamma: level, ..Self::CLEAR },
+            Axis::Noise => Self { noise: level, ..Self::CLEAR },
+            Axis::Occlusion => Self { occlusion: level, ..Self::CLEAR },
+            Axis::Light => Self { light: LIGHTS[(level as usize).min(LIGHTS.len() - 1)].0, ..Self::CLEAR },
+            Axis::Camera => Self { camera: CAMERAS[(level as usize).min(CAMERAS.len() - 1)].0, ..Self::CLEAR },
+        }
+    }
+
+    /// Makes of a rendered panorama what is seen under this condition; light and camera are there already. What is hidden loses its range and instance.
+    pub fn apply(&self, panorama: &mut Panorama, stream: &mut Stream) {
+        if self.occlusion > 0.0 {
+            hide(panorama, self.occlusion, stream);
+        }
+        if self.gain != 1.0 || self.gamma != 1.0 {
+            let table: [u8; 256] = std::array::from_fn(|v| {
+                let share = libm::pow(v as f64 / 255.0, self.gamma) * self.gain;
+                (255.0 * share).round().clamp(0.0, 255.0) as u8
+            });
+            for p in panorama.rgba.as_chunks_mut::<4>().0 {
+                *p = [table[p[0] as usize], table[p[1] as usize], table[p[2] as usize], p[3]];
+            }
+        }
+        if self.noise > 0.0 {
+            for p in panorama.rgba.as_chunks_mut::<4>().0 {
+                for v in &mut p[..3] {
+                    *v = (f64::from(*v) + self.noise * standard_normal(stream)).round().clamp(0.0, 255.0) as u8;
+                }
+            }
+        }
+    }
+}
+
+/// Widths of the things that hide others, rad: of people from 3 m to 1 m away.
+const HIDER_RAD: (f64, f64) = (0.15, 0.45);
+/// Edge of the patches that they wear, px.
+const PATCH_PX: usize = 7;
+
+/// Puts upright things with a patchy dress into the picture, from top to bottom, until `share` of the columns is hidden.
+fn hide(panorama: &mut Panorama, share: f64, stream: &mut Stream) {
+    let mut unit = || (stream.next_u64() >> 11) as f64 / (1_u64 << 53) as f64;
+    let (width, height) = (panorama.projection.width as usize, panorama.projection.height as usize);
+    let mut hidden = vec![false; width];
+    let wanted = (share * width as f64).round() as usize;
+    let mut count = 0;
+    while count < wanted.min(width) {
+        let first = (unit() * width as f64) as usize;
+        let columns = ((HIDER_RAD.0 + (HIDER_RAD.1 - HIDER_RAD.0) * unit()) / panorama.projection.pixel_rad()) as usize;
+        let colour = [unit(), unit(), unit()];
+        for patch in 0..columns.div_ceil(PATCH_PX) {
+            let shades: Vec<f64> = (0..height.div_ceil(PATCH_PX)).map(|_| 60.0 + 180.0 * unit()).collect();
+            for offset in patch * PATCH_PX..columns.min((patch + 1) * PATCH_PX) {
+                let column = (first + offset) % width;
+                if count == wanted || std::mem::replace(&mut hidden[column], true) {
+                    continue;
+                }
+                count += 1;
+                for row in 0..height {
+                    let k = row * width + column;
+                    for (value, tint) in panorama.rgba[4 * k..4 * k + 3].iter_mut().zip(colour) {
+                        *value = (shades[row / PATCH_PX] * (0.4 + 0.6 * tint)) as u8;
+                    }
+                    panorama.range_m[k] = 0.0;
+                    panorama.instance[k] = 0;
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::panorama::Projection;
+    use crate::random::Seed;
+
+    fn grey(value: u8) -> Panorama {
+        let mut panorama = Panorama::black(Projection::new(360, 40));
+        panorama.rgba.fill(value);
+        panorama.range_m.fill(2.0);
+        panorama
+    }
+
+    #[test]
+    fn conditions_do_what_they_say() {
+        let apply = |condition: Condition| {
+            let mut panorama = grey(100);
+            condition.apply(&mut panorama, &mut Seed(1).stream("test"));
+            panorama
+        };
+        assert_eq!(apply(Condition::CLEAR), grey(100));
+        assert!(apply(Condition::at(Axis::Gain, 1.4)).rgba.chunks(4).all(|p| p[0] == 140));
+        assert!(apply(Condition::at(Axis::Gain, 4.0)).rgba.chunks(4).all(|p| p[0] == 255));
+        let half = (255.0 * (100.0_f64 / 255.0).sqrt()).round() as u8;
+        assert!(apply(Condition::at(Axis::Gamma, 0.5)).rgba.chunks(4).all(|p| p[1] == half));
+        let hidden = apply(Condition::at(Axis::Occlusion, 0.3)).range_m.iter().filter(|r| **r == 0.0).count();
+        assert_eq!(hidden, 108 * 40);
+        let noisy = apply(Condition::at(Axis::Noise, 5.0));
+        let values: Vec<f64> = noisy.rgba.chunks(4).flat_map(|p| &p[..3]).map(|v| f64::from(*v) - 100.0).collect();
+        let variance = values.iter().map(|v| v * v).sum::<f64>() / values.len() as f64;
+        // 43,200 draws: three standard errors are 2 %; rounding adds 1/12.
+        assert!((variance - 25.0 - 1.0 / 12.0).abs() < 0.6, "{variance}");
+    }
+}

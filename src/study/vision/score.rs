@@ -1,0 +1,271 @@
+//! What extractor and truth have to say to one another: where a home feature must appear, and what a match is worth.
+
+use serde::Serialize;
+
+use crate::geometry::{Pose, angle_of, direction, wrap};
+use crate::observation::HomeSnapshot;
+use crate::panorama::Panorama;
+use crate::vision::{Extractor, Match};
+
+/// A match is right, and a feature found again, within this distance of where the truth puts it, px.
+pub const RIGHT_PX: f64 = 3.0;
+/// A feature is found again if its scale is wrong by at most this factor.
+const RIGHT_SCALE: f64 = 1.5;
+
+/// A panorama with its buffers of range and instance, and where the camera was.
+#[derive(Debug, Clone)]
+pub struct Shot {
+    /// What was seen.
+    pub panorama: Panorama,
+    /// Pose of the camera in the room.
+    pub pose: Pose,
+}
+
+/// Where something that was seen from home appears now.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Appearance {
+    /// Column and row, px.
+    pub px: (f64, f64),
+    /// Horizontal range at home over that now: by so much it looks larger.
+    pub zoom: f64,
+    /// Whether nothing hides it and it lies within the picture.
+    pub visible: bool,
+}
+
+impl Shot {
+    fn index(&self, (x, y): (f64, f64)) -> usize {
+        let (w, h) = (i64::from(self.panorama.projection.width), i64::from(self.panorama.projection.height));
+        let (x, y) = ((x.round() as i64).rem_euclid(w), (y.round() as i64).clamp(0, h - 1));
+        (y * w + x) as usize
+    }
+
+    fn range(&self, px: (f64, f64)) -> f64 {
+        f64::from(self.panorama.range_m[self.index(px)])
+    }
+
+    /// Where the surface point that is seen from here at `px` appears in `now`. A pixel at a silhouette is half one surface,
+    /// half another, so a point counts as visible if any pixel next to its place shows its range.
+    #[must_use]
+    pub fn appearance(&self, now: &Shot, px: (f64, f64)) -> Appearance {
+        let (from, to) = (self.panorama.projection, now.panorama.projection);
+        let tan = from.tan_elevation(px.1);
+        let flat = self.range(px) / (1.0 + tan * tan).sqrt();
+        let point = self.pose.transform(direction(from.azimuth(px.0)) * flat);
+        let seen = now.pose.inverse_transform(point);
+        let flat_now = seen.norm();
+        let height = flat * tan;
+        let (x, y) = (to.column(angle_of(seen)), to.row(height / flat_now));
+        let expected = (flat_now * flat_now + height * height).sqrt();
+        let around = (-1..=1).flat_map(|dx| (-1..=1).map(move |dy| (f64::from(dx), f64::from(dy))));
+        let agrees = |(dx, dy): (f64, f64)| (now.range((x + dx, y + dy)) - expected).abs() < 0.02 + 0.02 * expected;
+        let inside = y >= -0.5 && y <= f64::from(to.height) - 0.5;
+        Appearance { px: (x, y), zoom: flat / flat_now, visible: inside && around.into_iter().any(agrees) }
+    }
+
+    /// Instance seen at a place.
+    fn instance(&self, px: (f64, f64)) -> u16 {
+        self.panorama.instance[self.index(px)]
+    }
+}
+
+/// Difference of two columns, signed, the short way round.
+fn columns_apart(a: f64, b: f64, width: f64) -> f64 {
+    (a - b + 1.5 * width).rem_euclid(width) - 0.5 * width
+}
+
+/// What was found in some panoramas.
+#[derive(Debug, Clone, Default)]
+pub struct Score {
+    /// Panoramas.
+    pub panoramas: usize,
+    /// Home features that could be seen.
+    pub visible: usize,
+    /// Those of them that were found as features, matched or not.
+    pub repeated: usize,
+    /// Matches.
+    pub matches: usize,
+    /// Matches within [`RIGHT_PX`] of the truth.
+    pub right: usize,
+    /// Least number of right matches in a panorama.
+    pub least_right: usize,
+    /// Wrong matches that lie on the same instance as the home feature.
+    pub wrong_same_instance: usize,
+    /// Wrong matches within ten times [`RIGHT_PX`] of the truth.
+    pub wrong_near: usize,
+    /// Wrong matches that are neither.
+    pub wrong_wild: usize,
+    /// Bearing errors of right matches, rad.
+    pub errors_rad: Vec<f64>,
+    /// The same in units of the stated standard deviation.
+    pub normalised: Vec<f64>,
+    /// Bearing errors of objects, rad.
+    pub object_errors_rad: Vec<f64>,
+    /// The same in units of the stated standard deviation.
+    pub object_normalised: Vec<f64>,
+}
+
+impl Score {
+    /// Scores the last observation of `extractor`, which was made from `home` and has observed `now`.
+    pub fn add(&mut self, extractor: &Extractor, home: &Shot, now: &Shot) {
+        let width = f64::from(now.panorama.projection.width);
+        let seen: Vec<_> = extractor.keypoints().collect();
+        for keypoint in extractor.home_keypoints() {
+            let truth = home.appearance(now, keypoint.px);
+            if !truth.visible {
+                continue;
+            }
+            self.visible += 1;
+            let scale_px = keypoint.scale_px * truth.zoom;
+            self.repeated += usize::from(seen.iter().any(|k| {
+                let ratio = k.scale_px / scale_px;
+                off(k.px, truth.px, width) <= RIGHT_PX && ratio < RIGHT_SCALE && ratio * RIGHT_SCALE > 1.0
+            }));
+        }
+        let before = self.right;
+        for m in extractor.matches() {
+            self.add_match(m, home, now);
+        }
+        let right = self.right - before;
+        self.least_right = if self.panoramas == 0 { right } else { self.least_right.min(right) };
+        self.panoramas += 1;
+    }
+
+    fn add_match(&mut self, m: &Match, home: &Shot, now: &Shot) {
+        let projection = now.panorama.projection;
+        let truth = home.appearance(now, m.home_px);
+        let width = f64::from(projection.width);
+        let off_px = off(m.now_px, truth.px, width);
+        self.matches += 1;
+        if truth.visible && off_px <= RIGHT_PX {
+            self.right += 1;
+            let error = columns_apart(m.now_px.0, truth.px.0, width) * projection.pixel_rad();
+            self.errors_rad.push(error.abs());
+            self.normalised.push(error.abs() / (m.home_sd_rad * m.home_sd_rad + m.now_sd_rad * m.now_sd_rad).sqrt());
+        } else {
+            let (same, near) = (home.instance(m.home_px) == now.instance(m.now_px), off_px <= 10.0 * RIGHT_PX);
+            self.wrong_same_instance += usize::from(same);
+            self.wrong_near += usize::from(near);
+            self.wrong_wild += usize::from(!same && !near);
+        }
+    }
+
+    /// Scores the bearings of objects. The truth of an object is the mean azimuth of its features' places, hidden ones included.
+    pub fn add_objects(&mut self, extractor: &mut Extractor, snapshot: &HomeSnapshot, home: &Shot, now: &Shot) {
+        let keypoints: Vec<_> = extractor.home_keypoints().collect();
+        for bearing in extractor.observe(&now.panorama) {
+            let Some(at_home) = snapshot.bearings.iter().find(|b| b.id == bearing.id) else { continue };
+            let azimuths: Vec<f64> = extractor
+                .features_of(bearing.id)
+                .iter()
+                .map(|&k| now.panorama.projection.azimuth(home.appearance(now, keypoints[k].px).px.0))
+                .collect();
+            let mean = azimuths.iter().map(|a| wrap(a - bearing.azimuth_rad)).sum::<f64>() / azimuths.len().max(1) as f64;
+            self.object_errors_rad.push(mean.abs());
+            let sd_rad = (bearing.sd_rad * bearing.sd_rad + at_home.sd_rad * at_home.sd_rad).sqrt();
+            self.object_normalised.push(mean.abs() / sd_rad);
+        }
+    }
+
+    /// Joins another score to this one.
+    pub fn join(&mut self, other: Self) {
+        if other.panoramas == 0 {
+            return;
+        }
+        self.least_right = if self.panoramas == 0 { other.least_right } else { self.least_right.min(other.least_right) };
+        self.panoramas += other.panoramas;
+        self.visible += other.visible;
+        self.repeated += other.repeated;
+        self.matches += other.matches;
+        self.right += other.right;
+        self.wrong_same_instance += other.wrong_same_instance;
+        self.wrong_near += other.wrong_near;
+        self.wrong_wild += other.wrong_wild;
+        self.errors_rad.extend(other.errors_rad);
+        self.normalised.extend(other.normalised);
+        self.object_errors_rad.extend(other.object_errors_rad);
+        self.object_normalised.extend(other.object_normalised);
+    }
+
+    /// Share of right matches; 1 where there is none.
+    #[must_use]
+    pub fn precision(&self) -> f64 {
+        if self.matches == 0 { 1.0 } else { self.right as f64 / self.matches as f64 }
+    }
+
+    /// Share of the visible home features that were found.
+    #[must_use]
+    pub fn repeatability(&self) -> f64 {
+        self.repeated as f64 / self.visible.max(1) as f64
+    }
+}
+
+/// Distance of two places, px.
+fn off(a: (f64, f64), b: (f64, f64), width: f64) -> f64 {
+    let (dx, dy) = (columns_apart(a.0, b.0, width), a.1 - b.1);
+    (dx * dx + dy * dy).sqrt()
+}
+
+/// Some quantiles of errors.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Spread {
+    /// Median.
+    pub median: f64,
+    /// Two thirds of the errors are smaller (68.3 %, one standard deviation of a normal distribution).
+    pub q68: f64,
+    /// 95 % of the errors are smaller.
+    pub q95: f64,
+}
+
+impl Spread {
+    /// Quantiles of `values`; `None` of no values.
+    #[must_use]
+    pub fn of(values: &[f64]) -> Option<Self> {
+        let mut sorted = values.to_vec();
+        sorted.sort_by(f64::total_cmp);
+        let at = |share: f64| sorted.get(((sorted.len() as f64 - 1.0) * share) as usize).copied();
+        Some(Self { median: at(0.5)?, q68: at(0.683)?, q95: at(0.95)? })
+    }
+
+    /// The same in another unit.
+    #[must_use]
+    pub fn times(self, factor: f64) -> Self {
+        Self { median: factor * self.median, q68: factor * self.q68, q95: factor * self.q95 }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::panorama::Projection;
+
+    /// In a round room of radius 4 m around home, from 1 m to the left: what was ahead is 4.12 m away, 14 degrees to the right.
+    #[test]
+    fn a_point_appears_where_geometry_says() {
+        let projection = Projection::new(720, 90);
+        let shot = |pose: Pose, range: &dyn Fn(f64, f64) -> f64| {
+            let mut panorama = Panorama::black(projection);
+            for (k, r) in panorama.range_m.iter_mut().enumerate() {
+                let azimuth = projection.azimuth((k % 720) as f64);
+                let tan = projection.tan_elevation((k / 720) as f64);
+                *r = (range(azimuth, tan) * (1.0 + tan * tan).sqrt()) as f32;
+            }
+            Shot { panorama, pose }
+        };
+        let home = shot(Pose::new(2.0, 1.0, 0.5), &|_, _| 4.0);
+        let place = home.pose.transform(crate::geometry::Vector2::new(0.0, 1.0));
+        // From 1 m off the centre: distance to the circle in direction a.
+        let off_centre = |a: f64| {
+            let (s, _) = crate::geometry::sin_cos(a);
+            -s + (s * s + 15.0).sqrt()
+        };
+        let now = shot(Pose::new(place.x, place.y, 0.5), &|a, _| off_centre(a));
+        let there = home.appearance(&now, (0.0, 30.0));
+        assert!(there.visible);
+        let azimuth = crate::geometry::atan2(-1.0, 4.0);
+        assert!((there.px.0 - projection.column(azimuth)).abs() < 1e-4, "{there:?}");
+        let tan = projection.tan_elevation(30.0) * 4.0 / 17f64.sqrt();
+        assert!((there.px.1 - projection.row(tan)).abs() < 1e-4 && (there.zoom - 4.0 / 17f64.sqrt()).abs() < 1e-6, "{there:?}");
+        let hidden = shot(now.pose, &|_, _| 1.0);
+        assert!(!home.appearance(&hidden, (0.0, 30.0)).visible);
+    }
+}
