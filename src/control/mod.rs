@@ -7,6 +7,8 @@
 pub mod printed;
 pub mod vectors;
 
+pub mod escape;
+
 use crate::geometry::{Pose, Twist, angle_of, wrap};
 use crate::observation::{RobotSheet, TaskSheet};
 

@@ -8,6 +8,7 @@ mod vector;
 
 use serde::Serialize;
 
+use crate::control::escape::Escape;
 use crate::control::vectors::VectorLaw;
 use crate::control::{Controller, Law};
 use crate::error::{Error, Result};
@@ -107,18 +108,20 @@ struct AnchoredHoming {
     /// Speed last commanded.
     speed_m_s: f64,
     unsure_since_s: Option<f64>,
+    escape: Escape,
     arrived: bool,
 }
 
 impl AnchoredHoming {
     fn new(settings: FilterSettings, controller: Controller, briefing: &Briefing) -> Self {
         Self {
-            filter: AnchoredFilter::new(settings, &briefing.home),
+            filter: AnchoredFilter::new(FilterSettings { track_m: briefing.robot.track_m, ..settings }, &briefing.home),
             controller,
             arrival_radius_m: briefing.task.arrival_radius_m,
             max_acceleration_m_s2: briefing.robot.max_acceleration_m_s2,
             speed_m_s: 0.0,
             unsure_since_s: None,
+            escape: Escape::new(briefing.robot, briefing.task),
             arrived: false,
         }
     }
@@ -154,12 +157,14 @@ impl Method for AnchoredHoming {
             _ if self.arrived => Twist::default(),
             (Some(estimate), _) => {
                 let (command, arrived) = self.approach(estimate, observation.time_s);
-                self.arrived = arrived;
+                self.arrived = arrived && !self.escape.is_active();
                 command
             }
             (None, Some(guess)) => self.search(&guess, observation.time_s),
             (None, None) => Twist { v: 0.0, omega: 0.6 },
         };
+        let command =
+            if self.arrived { command } else { self.escape.guard(observation.time_s, &self.filter.map_pose(), command) };
         self.speed_m_s = command.v;
         let status = if self.arrived { Status::Arrived } else { Status::Running };
         let nis = if report.matched > 0 { report.nis / report.matched as f64 } else { f64::NAN };

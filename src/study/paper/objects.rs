@@ -270,6 +270,7 @@ mod tests {
             now_px: (now, 20.0),
             home_scale_px: 2.0,
             now_scale_px: 2.0,
+            misfit: 0.0,
             distance: 0.1,
             home_sd_rad: 1e-3,
             now_sd_rad: 1e-3,
