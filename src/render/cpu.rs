@@ -7,6 +7,7 @@
 //! depends on how the work is cut.
 
 use std::ops::Range;
+use std::sync::{Mutex, PoisonError};
 
 use rayon::prelude::*;
 
@@ -33,6 +34,13 @@ type BandBuffers<'a> = (usize, ((&'a mut [u8], &'a mut [f32]), &'a mut [u16]));
 #[derive(Debug)]
 pub struct CpuRenderer {
     info: RendererInfo,
+    /// Those that are idle; there are as many as pictures were ever rendered at once.
+    painters: Mutex<Vec<Painter>>,
+}
+
+/// What it takes to render a picture. Its buffers grow with the first one.
+#[derive(Debug)]
+struct Painter {
     frame: Frame,
     hits: ColumnHits,
 }
@@ -42,7 +50,17 @@ impl CpuRenderer {
     #[must_use]
     pub fn new() -> Self {
         let info = RendererInfo { kind: "cpu".to_owned(), adapter: instruction_set().to_owned(), driver: String::new() };
-        Self { info, frame: Frame::new(), hits: ColumnHits::default() }
+        Self { info, painters: Mutex::new(Vec::new()) }
+    }
+
+    /// Does something with an idle painter, or a new one.
+    fn paint_with<T>(&self, work: impl FnOnce(&mut Painter) -> T) -> T {
+        let idle = || self.painters.lock().unwrap_or_else(PoisonError::into_inner);
+        let painter = idle().pop();
+        let mut painter = painter.unwrap_or_else(|| Painter { frame: Frame::new(), hits: ColumnHits::default() });
+        let result = work(&mut painter);
+        idle().push(painter);
+        result
     }
 }
 
@@ -62,6 +80,31 @@ impl Default for CpuRenderer {
 
 impl Renderer for CpuRenderer {
     fn render(&mut self, scene: &Scene, view: &View<'_>, out: &mut Panorama) -> Result<()> {
+        // Inside a pool the caller already spreads pictures over the cores.
+        let alone = rayon::current_thread_index().is_none();
+        self.paint_with(|painter| painter.paint(scene, view, out, alone))
+    }
+
+    fn render_group(&mut self, scene: &Scene, views: &[View<'_>], out: &mut [Panorama]) -> Result<()> {
+        assert_eq!(views.len(), out.len(), "a place for each view");
+        if let ([view], [out]) = (views, &mut *out) {
+            return self.paint_with(|painter| painter.paint(scene, view, out, true));
+        }
+        views
+            .par_iter()
+            .zip(out)
+            .with_max_len(1)
+            .try_for_each(|(view, out)| self.paint_with(|painter| painter.paint(scene, view, out, false)))
+    }
+
+    fn info(&self) -> &RendererInfo {
+        &self.info
+    }
+}
+
+impl Painter {
+    /// Renders a view; `share` its bands with the other threads or paint them all in this one.
+    fn paint(&mut self, scene: &Scene, view: &View<'_>, out: &mut Panorama, share: bool) -> Result<()> {
         self.frame.prepare(scene, view)?;
         self.hits.find(&self.frame);
         let pixels = view.projection.pixels();
@@ -76,27 +119,22 @@ impl Renderer for CpuRenderer {
         let paint_band = |(k, ((rgba, range), instance)): BandBuffers<'_>| {
             paint(Band { scene, frame, hits, first_row: k * rows, rgba, range, instance });
         };
-        // Inside a pool the caller already spreads pictures over the cores.
-        if rayon::current_thread_index().is_some() {
-            out.rgba
-                .chunks_mut(4 * size)
-                .zip(out.range_m.chunks_mut(size))
-                .zip(out.instance.chunks_mut(size))
-                .enumerate()
-                .for_each(paint_band);
-        } else {
+        if share {
             out.rgba
                 .par_chunks_mut(4 * size)
                 .zip(out.range_m.par_chunks_mut(size))
                 .zip(out.instance.par_chunks_mut(size))
                 .enumerate()
                 .for_each(paint_band);
+        } else {
+            out.rgba
+                .chunks_mut(4 * size)
+                .zip(out.range_m.chunks_mut(size))
+                .zip(out.instance.chunks_mut(size))
+                .enumerate()
+                .for_each(paint_band);
         }
         Ok(())
-    }
-
-    fn info(&self) -> &RendererInfo {
-        &self.info
     }
 }
 
