@@ -17,11 +17,10 @@ fn lit(lamp: Lamp, offset_squared: f32, z: f32, facing: f32) -> f32 {
     return lamp.intensity * max(facing, 0.0) / (square * sqrt(square));
 }
 
-// Colour times light, packed with red in the lowest byte; opaque. Light is rounded to 1/4096, at most 16.
-fn light_up(colour: vec2<u32>, light: f32) -> u32 {
+// Colour in 1/256 times light, packed with red in the lowest byte; opaque. Light is rounded to 1/4096, at most 16.
+fn light_up(colour: vec4<u32>, light: f32) -> u32 {
     let factor = u32(round_small(min(light * 4096.0, 65535.0)));
-    let channels = vec4<u32>(colour & vec2<u32>(0xffffu), colour >> vec2<u32>(16u));
-    let lit = min(((channels * 16u + 8u) * factor) >> vec4<u32>(16u), vec4<u32>(255u));
+    let lit = min((((colour * factor) >> vec4<u32>(16u)) + vec4<u32>(8u)) >> vec4<u32>(4u), vec4<u32>(255u));
     return lit.x | (lit.y << 8u) | (lit.z << 16u) | 0xff000000u;
 }
 
@@ -93,5 +92,5 @@ fn shade_plane(plane: Plane, direction: vec2<f32>, t: f32, inverse_tan: f32) -> 
         let to = lamps[k].position - t * direction;
         light += lit(lamps[k], dot(to, to), plane.z, plane.up * (lamps[k].height - plane.z));
     }
-    return light_up(sample_strip(new_strip(plane.material, u, v, 0, detail), 0u), light);
+    return light_up(sample_point(plane.material, u, v, detail), light);
 }

@@ -25,6 +25,8 @@ mod hits;
 mod sample;
 mod scene;
 mod shade;
+mod spans;
+mod texels;
 mod texture;
 
 use crate::error::{Error, Result};

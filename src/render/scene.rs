@@ -107,6 +107,9 @@ impl Scene {
     }
 }
 
+/// Texels after the last texture, for vectors that read beyond a line that they need a part of.
+const PADDING: usize = 16;
+
 /// Bakes every texture once, also where several surfaces share it.
 fn pack(textures: &[&TextureSpec]) -> (Vec<Material>, Vec<u32>) {
     let mut distinct: Vec<&TextureSpec> = Vec::new();
@@ -121,7 +124,7 @@ fn pack(textures: &[&TextureSpec]) -> (Vec<Material>, Vec<u32>) {
         .collect();
     let sizes = texture::log2_sizes(&distinct);
     let baked: Vec<texture::Baked> = distinct.par_iter().zip(sizes).map(|(t, n)| texture::bake(t, n)).collect();
-    let mut atlas = Vec::with_capacity(baked.iter().map(|b| b.texels.len()).sum());
+    let mut atlas = Vec::with_capacity(baked.iter().map(|b| b.texels.len()).sum::<usize>() + PADDING);
     let packed: Vec<Material> = baked
         .iter()
         .zip(&distinct)
@@ -132,5 +135,6 @@ fn pack(textures: &[&TextureSpec]) -> (Vec<Material>, Vec<u32>) {
             Material { base, log2_size: b.log2_size, texels_per_m, padding: 0 }
         })
         .collect();
+    atlas.resize(atlas.len() + PADDING, 0);
     (which.into_iter().map(|k| packed[k]).collect(), atlas)
 }

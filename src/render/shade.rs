@@ -3,12 +3,10 @@
 //! Light is Lambert's: each lamp's inverse-square irradiance times the cosine of incidence, and the ambient light. There are no
 //! shadows and no reflections.
 
-use std::ops::Range;
-
 use super::Scene;
 use super::columns::Hit;
 use super::frame::{Frame, Lamp};
-use super::sample::{RUN, Strip, level, round, sample_points, within_tile};
+use super::sample::{LANES, POINTS, PointRoom, Points, RUN, Strip, StripRoom, is_wanted, level, round, within_tile};
 use super::scene::Material;
 
 /// Least distance from a lamp that counts, squared, m^2: a lamp is no point.
@@ -26,17 +24,21 @@ fn lit(lamp: &Lamp, offset_squared: f32, z: f32, facing: f32) -> f32 {
     lamp.intensity * facing / (square * square.sqrt())
 }
 
-/// Colour times light, opaque. Light is rounded to 1/4096, at most 16, and the product is one of integers.
-#[inline(always)]
-fn light_up(colour: u32, light: f32) -> u32 {
-    let scaled = light * 4096.0;
-    let factor = round(if scaled < 65535.0 { scaled } else { 65535.0 }) as u32;
-    let channel = |c: u32| ((((c & 255) * 16 + 8) * factor) >> 16).min(255);
-    channel(colour) | channel(colour >> 8) << 8 | channel(colour >> 16) << 16 | 0xff00_0000
+/// Where the sides of a column are shaded.
+#[derive(Debug)]
+pub(super) struct SideRoom {
+    strip: StripRoom,
+    light: [f32; RUN],
 }
 
-/// Colours of the rows from `first_row` to `first_row + count` of a column that sees the side of `hit`; the colours up to the
-/// next multiple of eight are void.
+impl Default for SideRoom {
+    fn default() -> Self {
+        Self { strip: StripRoom::default(), light: [0.0; RUN] }
+    }
+}
+
+/// Colours of the rows from `first_row` to `first_row + count` of a column that sees the side of `hit`; at most [`RUN`]. What
+/// follows in `out` up to a whole number of blocks is overwritten, too.
 #[inline(always)]
 pub(super) fn shade_side(
     scene: &Scene,
@@ -45,7 +47,8 @@ pub(super) fn shade_side(
     direction: [f32; 2],
     first_row: usize,
     count: usize,
-    out: &mut [u32; RUN],
+    room: &mut SideRoom,
+    out: &mut [u32],
 ) {
     let material = &scene.materials[hit.surface as usize];
     let eye = frame.params.camera_height;
@@ -55,11 +58,8 @@ pub(super) fn shade_side(
     let level = level(material, across / cosine.max(LEAST_COSINE), across);
     let foot = hit.bottom.max(0.0);
     let v = eye + hit.near * frame.rows[0].tan - foot;
-    let whole = count.next_multiple_of(8);
-    let out = &mut out[..whole];
-    Strip::new(material, hit.u, v, across, level).sample(&scene.atlas, first_row, out);
-    let mut light = [frame.params.ambient; RUN];
-    let light = &mut light[..whole];
+    let light = &mut room.light[..count];
+    light.fill(frame.params.ambient);
     for lamp in &frame.lamps {
         let to = [lamp.position[0] - hit.near * direction[0], lamp.position[1] - hit.near * direction[1]];
         let facing = hit.normal[0] * to[0] + hit.normal[1] * to[1];
@@ -70,9 +70,9 @@ pub(super) fn shade_side(
             }
         }
     }
-    for (colour, light) in out.iter_mut().zip(light) {
-        *colour = light_up(*colour, *light);
-    }
+    let strip = Strip::new(&scene.atlas, material, [hit.u, v, across], level, first_row);
+    let blocks = count.div_ceil(LANES);
+    strip.shade(&room.light.as_chunks().0[..blocks], &mut room.strip, &mut out.as_chunks_mut().0[..blocks]);
 }
 
 /// A horizontal surface: floor, ceiling, or the top or underside of a body.
@@ -108,41 +108,65 @@ impl Plane {
         Self { material, heading, camera, z, up: if underside { -1.0 } else { 1.0 } }
     }
 
-    /// Colours of the columns `wanted` of a row that sees it, at horizontal distance `t`; the other colours mean nothing.
+    /// Height of the surface, m.
+    pub fn height(&self) -> f32 {
+        self.z
+    }
+
+    /// Colours of some columns of a row that sees it, at horizontal distance `t`: those that have a bit in `wanted`.
     #[inline(always)]
-    pub fn shade<const N: usize>(
+    pub fn shade(
         &self,
         scene: &Scene,
         frame: &Frame,
-        [x, y]: &[[f32; N]; 2],
-        t: f32,
-        inverse_tan: f32,
-        wanted: Range<usize>,
-    ) -> [u32; N] {
+        [x, y]: [&[f32; POINTS]; 2],
+        [t, inverse_tan]: [f32; 2],
+        wanted: u64,
+        room: &mut PointRoom,
+        out: &mut [u32; POINTS],
+    ) {
         let [cos, sin] = self.heading;
         let across = t * frame.params.pixel_rad;
         let level = level(&self.material, across * inverse_tan.abs(), across);
         let texels = t * self.material.texels_per_m;
-        let fixed = |along: f32, camera: f32| round((texels * along + camera) * 256.0) << 8;
-        let (mut u, mut v) = ([0; N], [0; N]);
-        for k in 0..N {
-            u[k] = fixed(cos * x[k] + sin * y[k], self.camera[0]);
-            v[k] = fixed(cos * y[k] - sin * x[k], self.camera[1]);
+        let (mut u, mut v) = ([0; POINTS], [0; POINTS]);
+        for k in 0..POINTS {
+            u[k] = round((texels * (cos * x[k] + sin * y[k]) + self.camera[0]) * 256.0) << 8;
+            v[k] = round((texels * (cos * y[k] - sin * x[k]) + self.camera[1]) * 256.0) << 8;
         }
-        let mut colours = sample_points(&scene.atlas, &self.material, [&u, &v], level, wanted);
-        let mut light = [frame.params.ambient; N];
-        for lamp in &frame.lamps {
-            let facing = self.up * (lamp.height - self.z);
-            if facing > 0.0 {
-                for (k, light) in light.iter_mut().enumerate() {
-                    let to = [lamp.position[0] - t * x[k], lamp.position[1] - t * y[k]];
-                    *light += lit(lamp, to[0] * to[0] + to[1] * to[1], self.z, facing);
+        let points = Points { atlas: &scene.atlas, material: &self.material, u: &u, v: &v, level };
+        points.look_up(wanted, room);
+        let (x, y, out) = (x.as_chunks().0, y.as_chunks().0, out.as_chunks_mut::<LANES>().0);
+        for (block, ((x, y), out)) in x.iter().zip(y).zip(out).enumerate() {
+            if !is_wanted(wanted, block) {
+                continue;
+            }
+            let mut lit = [0; LANES];
+            points.shade(block, &self.light(frame, x, y, t), room, &mut lit);
+            let wanted = (wanted >> (LANES * block)) as u16;
+            if wanted == u16::MAX {
+                *out = lit;
+            } else {
+                for k in 0..LANES {
+                    out[k] = if wanted >> k & 1 != 0 { lit[k] } else { out[k] };
                 }
             }
         }
-        for (colour, light) in colours.iter_mut().zip(light) {
-            *colour = light_up(*colour, light);
+    }
+
+    /// Light on it in some directions at horizontal distance `t`.
+    #[inline(always)]
+    fn light(&self, frame: &Frame, x: &[f32; LANES], y: &[f32; LANES], t: f32) -> [f32; LANES] {
+        let mut light = [frame.params.ambient; LANES];
+        for lamp in &frame.lamps {
+            let facing = self.up * (lamp.height - self.z);
+            if facing > 0.0 {
+                for k in 0..LANES {
+                    let to = [lamp.position[0] - t * x[k], lamp.position[1] - t * y[k]];
+                    light[k] += lit(lamp, to[0] * to[0] + to[1] * to[1], self.z, facing);
+                }
+            }
         }
-        colours
+        light
     }
 }
