@@ -17,6 +17,10 @@ struct Params {
     camera: vec2<f32>,
     room_height: f32,
     ambient: f32,
+    equal_angle: u32,
+    pane_count: u32,
+    corner_shade: f32,
+    inverse_reach: f32,
 }
 
 struct Row {
@@ -43,9 +47,9 @@ struct Body {
     radius: f32,
     first_edge: u32,
     edge_count: u32,
+    glow: f32,
     padding_0: u32,
     padding_1: u32,
-    padding_2: u32,
 }
 
 @group(0) @binding(0) var<uniform> params: Params;

@@ -75,7 +75,7 @@ fn render(@builtin(global_invocation_id) id: vec3<u32>) {
                 surface = hits[owner].surface;
                 underside = face == UNDERSIDE;
             }
-            colour = shade_plane(new_plane(surface, underside), direction, t, row.inverse_tan);
+            colour = shade_plane(new_plane(surface, underside), direction, t, row);
             range = t * row.stretch;
             instance = surface + 1u;
         }

@@ -7,8 +7,7 @@ const ROUNDER: f32 = 12582912.0;
 struct Material {
     base: u32,
     log2_size: u32,
-    texels_per_m: f32,
-    padding: u32,
+    texels_per_m: vec2<f32>,
 }
 
 @group(0) @binding(6) var<storage, read> materials: array<Material>;
@@ -18,16 +17,29 @@ fn round_small(x: f32) -> i32 {
     return bitcast<i32>(x + ROUNDER) - bitcast<i32>(ROUNDER);
 }
 
-fn level(material: Material, a_m: f32, b_m: f32) -> i32 {
-    let footprint = max(0.5 * max(a_m, b_m), min(a_m, b_m)) * material.texels_per_m;
+fn footprint(material: Material, covered_m: vec2<f32>) -> f32 {
+    let texels = covered_m * material.texels_per_m;
+    return max(0.5 * max(texels.x, texels.y), min(texels.x, texels.y));
+}
+
+fn strip_footprint(material: Material, covered_m: vec2<f32>) -> f32 {
+    let texels = covered_m * material.texels_per_m;
+    return max(0.5 * texels.x, texels.y);
+}
+
+fn level(material: Material, footprint: f32) -> i32 {
     let logarithm = (bitcast<i32>(footprint) - bitcast<i32>(1.0)) >> 15u;
     return (clamp(logarithm, 0, 256 * i32(material.log2_size)) + 32) & -64;
 }
 
-fn within_tile(length_m: f32, material: Material) -> f32 {
+fn within_tile(length_m: f32, material: Material, scale: f32) -> f32 {
     let size = f32(1u << material.log2_size);
-    let texels = length_m * material.texels_per_m;
+    let texels = length_m * scale;
     return texels - size * floor(texels / size);
+}
+
+fn coordinate(length_m: f32, material: Material, scale: f32) -> i32 {
+    return i32(within_tile(length_m, material, scale) * 65536.0);
 }
 
 fn level_base(material: Material, level: u32) -> u32 {

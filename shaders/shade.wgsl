@@ -2,11 +2,16 @@
 
 const LAMP_SIZE_SQUARED: f32 = 0.01;
 const LEAST_COSINE: f32 = 0.05;
+const LEAST_SQUARE: f32 = 1.0e-4;
+const BEHIND: f32 = 1.0e-6;
 
 struct Lamp {
     position: vec2<f32>,
     height: f32,
     intensity: f32,
+    normal: vec2<f32>,
+    size_squared: f32,
+    padding: u32,
 }
 
 @group(0) @binding(5) var<storage, read> lamps: array<Lamp>;
@@ -15,6 +20,42 @@ fn lit(lamp: Lamp, offset_squared: f32, z: f32, facing: f32) -> f32 {
     let up = lamp.height - z;
     let square = max(offset_squared + up * up, LAMP_SIZE_SQUARED);
     return lamp.intensity * max(facing, 0.0) / (square * sqrt(square));
+}
+
+fn lit_by_window(pane: Lamp, weight: f32, offset_squared: f32, z: f32) -> f32 {
+    let up = pane.height - z;
+    let square = max(offset_squared + up * up, LEAST_SQUARE);
+    return weight / (square * (square + pane.size_squared));
+}
+
+fn corner_depth(distance: f32) -> f32 {
+    let depth = max(1.0 - distance * params.inverse_reach, 0.0);
+    return depth * depth;
+}
+
+fn depth_at_wall(edge: Edge, point: vec2<f32>, normal: vec2<f32>) -> f32 {
+    let before = dot(edge.normal, point) - edge.distance;
+    let along = dot(edge.tangent, point) - edge.along;
+    let past = max(max(-along, along - edge.length), 0.0);
+    let turned = min(1.0 - dot(normal, edge.normal), 1.0);
+    let depth = turned * corner_depth(sqrt(before * before + past * past));
+    return select(0.0, depth, before > -BEHIND);
+}
+
+// How deep a point is in the corners between its surface and the walls.
+fn nook(point: vec2<f32>, normal: vec2<f32>) -> f32 {
+    var deepest = 0.0;
+    for (var k = 0u; k < params.wall_count; k++) {
+        deepest = max(deepest, depth_at_wall(edges[k], point, normal));
+    }
+    return deepest;
+}
+
+fn glow_of(surface: u32) -> f32 {
+    if surface < 2u + params.wall_count {
+        return 0.0;
+    }
+    return bodies[surface - 2u - params.wall_count].glow;
 }
 
 // Colour in 1/256 times light, packed with red in the lowest byte; opaque. Light is rounded to 1/4096, at most 16.
@@ -30,28 +71,61 @@ struct Side {
     near: f32,
     point: vec2<f32>,
     normal: vec2<f32>,
+    material: Material,
+    u: i32,
+    slant: f32,
+    foot: f32,
+    glow: f32,
+    // Share of ambient light that comes past the walls.
+    open: f32,
 }
 
 fn new_side(hit: Hit, direction: vec2<f32>) -> Side {
     let material = materials[hit.surface];
     let cosine = -dot(hit.normal, direction);
     let across = hit.near * params.pixel_rad;
-    let detail = level(material, across / max(cosine, LEAST_COSINE), across);
-    let v_m = params.camera_height + hit.near * rows[0].tan - max(hit.bottom, 0.0);
-    let u = i32(within_tile(hit.u, material) * 65536.0);
-    let v = i32(within_tile(v_m, material) * 65536.0);
-    let step = i32(across * material.texels_per_m * -65536.0);
-    return Side(new_strip(material, u, v, step, detail), hit.near, hit.near * direction, hit.normal);
+    let slant = across / max(cosine, LEAST_COSINE);
+    let foot = max(hit.bottom, 0.0);
+    let detail = level(material, strip_footprint(material, vec2<f32>(slant, across)));
+    let u = coordinate(hit.u, material, material.texels_per_m.x);
+    let v = coordinate(params.camera_height + hit.near * rows[0].tan - foot, material, material.texels_per_m.y);
+    let step = i32(across * material.texels_per_m.y * -65536.0);
+    let point = hit.near * direction;
+    var open = 1.0;
+    if params.corner_shade > 0.0 {
+        open = 1.0 - params.corner_shade * nook(point, hit.normal);
+    }
+    let strip = new_strip(material, u, v, step, detail);
+    return Side(strip, hit.near, point, hit.normal, material, u, slant, foot, glow_of(hit.surface), open);
 }
 
 fn shade_side(side: Side, row: u32) -> u32 {
     let z = params.camera_height + side.near * rows[row].tan;
     var light = params.ambient;
+    if params.corner_shade > 0.0 {
+        let edge = max(corner_depth(z), corner_depth(params.room_height - z));
+        light *= side.open * (1.0 - params.corner_shade * edge);
+    }
+    light += side.glow;
     for (var k = 0u; k < params.lamp_count; k++) {
         let to = lamps[k].position - side.point;
         light += lit(lamps[k], dot(to, to), z, dot(side.normal, to));
     }
-    return light_up(sample_strip(side.strip, row), light);
+    for (var k = params.lamp_count; k < params.lamp_count + params.pane_count; k++) {
+        let to = lamps[k].position - side.point;
+        let facing = dot(side.normal, to);
+        let faced = -dot(lamps[k].normal, to);
+        if facing > 0.0 && faced > 0.0 {
+            light += lit_by_window(lamps[k], lamps[k].intensity * facing * faced, dot(to, to), z);
+        }
+    }
+    if params.equal_angle == 0u {
+        return light_up(sample_strip(side.strip, row), light);
+    }
+    let high = side.near * params.pixel_rad * rows[row].stretch * rows[row].stretch;
+    let detail = level(side.material, footprint(side.material, vec2<f32>(side.slant, high)));
+    let v = coordinate(z - side.foot, side.material, side.material.texels_per_m.y);
+    return light_up(sample_point(side.material, side.u, v, detail), light);
 }
 
 struct Plane {
@@ -60,6 +134,7 @@ struct Plane {
     camera: vec2<f32>,
     z: f32,
     up: f32,
+    glow: f32,
 }
 
 fn new_plane(surface: u32, underside: bool) -> Plane {
@@ -75,22 +150,39 @@ fn new_plane(surface: u32, underside: bool) -> Plane {
         heading = body.heading;
         z = select(body.top, body.bottom, underside);
     }
-    camera = vec2<f32>(within_tile(camera.x, material), within_tile(camera.y, material));
-    return Plane(material, heading, camera, z, select(1.0, -1.0, underside));
+    let scale = material.texels_per_m;
+    camera = vec2<f32>(within_tile(camera.x, material, scale.x), within_tile(camera.y, material, scale.y));
+    return Plane(material, heading, camera, z, select(1.0, -1.0, underside), glow_of(surface));
 }
 
-fn shade_plane(plane: Plane, direction: vec2<f32>, t: f32, inverse_tan: f32) -> u32 {
+fn shade_plane(plane: Plane, direction: vec2<f32>, t: f32, row: Row) -> u32 {
     let cos = plane.heading.x;
     let sin = plane.heading.y;
     let across = t * params.pixel_rad;
-    let detail = level(plane.material, across * abs(inverse_tan), across);
-    let texels = t * plane.material.texels_per_m;
-    let u = round_small((texels * (cos * direction.x + sin * direction.y) + plane.camera.x) * 256.0) << 8u;
-    let v = round_small((texels * (cos * direction.y - sin * direction.x) + plane.camera.y) * 256.0) << 8u;
+    let spread = select(row.stretch * row.stretch, 1.0, params.equal_angle == 0u);
+    let deep = across * abs(row.inverse_tan) * spread;
+    let scale = plane.material.texels_per_m;
+    let detail = level(plane.material, max(0.5 * max(deep, across), min(deep, across)) * max(scale.x, scale.y));
+    let texels = t * scale;
+    let u = round_small((texels.x * (cos * direction.x + sin * direction.y) + plane.camera.x) * 256.0) << 8u;
+    let v = round_small((texels.y * (cos * direction.y - sin * direction.x) + plane.camera.y) * 256.0) << 8u;
+    let point = t * direction;
     var light = params.ambient;
+    if params.corner_shade > 0.0 {
+        light *= 1.0 - params.corner_shade * nook(point, vec2<f32>(0.0));
+    }
+    light += plane.glow;
     for (var k = 0u; k < params.lamp_count; k++) {
-        let to = lamps[k].position - t * direction;
+        let to = lamps[k].position - point;
         light += lit(lamps[k], dot(to, to), plane.z, plane.up * (lamps[k].height - plane.z));
+    }
+    for (var k = params.lamp_count; k < params.lamp_count + params.pane_count; k++) {
+        let facing = plane.up * (lamps[k].height - plane.z);
+        if facing > 0.0 {
+            let to = lamps[k].position - point;
+            let weight = lamps[k].intensity * facing * max(-dot(lamps[k].normal, to), 0.0);
+            light += lit_by_window(lamps[k], weight, dot(to, to), plane.z);
+        }
     }
     return light_up(sample_point(plane.material, u, v, detail), light);
 }

@@ -47,6 +47,18 @@ pub enum Error {
         /// What is allowed.
         allowed: String,
     },
+    /// A picture was asked for from inside a body.
+    #[error("camera: found ({x_m}, {y_m}, {z_m}) m, inside `{body}`, allowed is a place outside all bodies")]
+    CameraInside {
+        /// Name of the body.
+        body: String,
+        /// x of the camera in the room, m.
+        x_m: f64,
+        /// y, m.
+        y_m: f64,
+        /// Height above the floor, m.
+        z_m: f64,
+    },
     /// A folder for results holds something that the command has not written.
     #[error("{} holds {found}, which this command did not write; choose another folder with --out", path.display())]
     OutputTaken {

@@ -1,14 +1,15 @@
 //! Panoramas: what a camera with a full turn of view sees, with range and instance beside the colours.
 //!
-//! The projection is cylindrical: columns are evenly spaced in azimuth, rows evenly spaced in the tangent of elevation, and
-//! pixels are square at the horizon. Column 0 looks along the robot's heading plus the camera's mounting offset; azimuth grows
+//! Columns are evenly spaced in azimuth, and pixels are square at the horizon. Rows are evenly spaced in the tangent of
+//! elevation (a cylinder) or in elevation itself (equal angles), see [`ProjectionKind`]. Column 0 looks along the robot's heading plus the camera's mounting offset; azimuth grows
 //! anti-clockwise with the column. Row 0 is the top.
 
 use std::f64::consts::TAU;
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::geometry::wrap;
+use crate::geometry::{atan2, sin_cos, wrap};
 
 /// Instance id of the floor.
 pub const INSTANCE_FLOOR: u16 = 1;
@@ -16,6 +17,17 @@ pub const INSTANCE_FLOOR: u16 = 1;
 pub const INSTANCE_CEILING: u16 = 2;
 /// Instance id of the first wall; walls and then bodies follow in the order of the world file.
 pub const INSTANCE_FIRST_WALL: u16 = 3;
+
+/// How elevation is spread over the rows of a panorama.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum ProjectionKind {
+    /// Evenly in its tangent: upright straight lines keep their proportions.
+    #[default]
+    Cylindrical,
+    /// Evenly in the angle itself, by the same angle as the columns: 2 to 1 is the whole sphere.
+    EqualAngle,
+}
 
 /// Size and projection of a panorama.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -28,16 +40,19 @@ pub struct Projection {
     pub horizon_row: f64,
     /// Azimuth of the centre of column 0 from the robot's heading, rad.
     pub mount_rad: f64,
+    /// How elevation is spread over the rows.
+    #[serde(default)]
+    pub kind: ProjectionKind,
 }
 
 impl Projection {
     /// A panorama of `width` x `height` with the horizon in the middle and column 0 along the heading.
     #[must_use]
     pub fn new(width: u32, height: u32) -> Self {
-        Self { width, height, horizon_row: f64::from(height) / 2.0, mount_rad: 0.0 }
+        Self { width, height, horizon_row: f64::from(height) / 2.0, mount_rad: 0.0, kind: ProjectionKind::Cylindrical }
     }
 
-    /// Angle between neighbouring columns, rad; also the step of the tangent of elevation between rows.
+    /// Angle between neighbouring columns, rad; also the step between rows, of elevation or of its tangent.
     #[must_use]
     pub fn pixel_rad(&self) -> f64 {
         TAU / f64::from(self.width)
@@ -61,13 +76,24 @@ impl Projection {
     /// Tangent of the elevation of a (sub-pixel) row. Whole numbers are row centres.
     #[must_use]
     pub fn tan_elevation(&self, row: f64) -> f64 {
-        (self.horizon_row - 0.5 - row) * self.pixel_rad()
+        let up = (self.horizon_row - 0.5 - row) * self.pixel_rad();
+        match self.kind {
+            ProjectionKind::Cylindrical => up,
+            ProjectionKind::EqualAngle => {
+                let (sin, cos) = sin_cos(up);
+                sin / cos
+            }
+        }
     }
 
     /// Row whose tangent of elevation is `tan`: the inverse of [`Projection::tan_elevation`].
     #[must_use]
     pub fn row(&self, tan: f64) -> f64 {
-        self.horizon_row - 0.5 - tan / self.pixel_rad()
+        let up = match self.kind {
+            ProjectionKind::Cylindrical => tan,
+            ProjectionKind::EqualAngle => atan2(tan, 1.0),
+        };
+        self.horizon_row - 0.5 - up / self.pixel_rad()
     }
 
     /// Number of pixels.
@@ -115,7 +141,12 @@ mod tests {
         for column in [0.0, 0.25, 719.9, 720.0, 1439.5] {
             assert!((p.column(p.azimuth(column)) - column).abs() < 1e-9, "{column}");
         }
-        assert!((p.row(p.tan_elevation(12.5)) - 12.5).abs() < 1e-9);
+        for kind in [ProjectionKind::Cylindrical, ProjectionKind::EqualAngle] {
+            let p = Projection { kind, ..p };
+            assert!((p.row(p.tan_elevation(12.5)) - 12.5).abs() < 1e-9);
+        }
+        let sphere = Projection { kind: ProjectionKind::EqualAngle, ..Projection::new(720, 360) };
+        assert!((sphere.tan_elevation(89.5) - 1.0).abs() < 1e-12, "45 degrees up");
         assert_eq!(Projection::new(8, 4).azimuth(2.0), std::f64::consts::FRAC_PI_2);
     }
 }

@@ -75,6 +75,8 @@ fn bad_values_are_usage_errors() {
     assert_fails(&home(&["--noise-deg", "1"]), 2, &["--bearings noisy"]);
     assert_fails(&home(&["--bearings", "ideal", "--size", "64x32"]), 2, &["--bearings rendered"]);
     assert_fails(&home(&["--bearings", "ideal", "--start", "nowhere"]), 2, &["nowhere"]);
+    assert_fails(&home(&["--light", "dusk"]), 2, &["--light", "evening"]);
+    assert_fails(&home(&["--bearings", "ideal", "--home-camera", "cheap"]), 2, &["--bearings rendered"]);
     assert_fails(&run(folder.path(), &[]), 2, &["Usage"]);
     assert!(!folder.path().join("results").exists(), "a failure leaves no folder behind");
 }
@@ -204,7 +206,9 @@ fn a_seed_gives_the_same_bytes_on_any_number_of_threads() {
         let path = folder.path().join(out);
         (std::fs::read(path.join("trajectory.csv")).unwrap(), summary(&path))
     };
-    for sensor in [&["--bearings", "noisy"][..], &["--bearings", "rendered", "--size", "720x90"]] {
+    let cheap =
+        ["--bearings", "rendered", "--size", "720x90", "--camera", "cheap", "--light", "evening", "--home-light", "day"];
+    for sensor in [&["--bearings", "noisy"][..], &["--bearings", "rendered", "--size", "720x90"], &cheap] {
         let first = files(sensor, "1", "a");
         assert!(first.0.len() > 1000, "a trajectory of some steps");
         assert_eq!(first, files(sensor, "1", "a"), "a second time, in the same folder");
@@ -294,6 +298,34 @@ fn a_panorama_comes_with_its_truth() {
     {
         assert!((f64::from(range.0[0]) - expected_mm).abs() < 2.0, "{} mm, expected {expected_mm}", range.0[0]);
     }
+}
+
+#[test]
+fn light_and_camera_change_colours_and_nothing_else() {
+    let folder = tempfile::tempdir().unwrap();
+    let render = |more: &[&str]| {
+        let common = ["render", "gallery", "--pose", "2.6,3.4,20", "--size", "256x48", "--renderer", "cpu", "--out", "view"];
+        assert_done(&run(folder.path(), &[&common, more].concat()));
+        ["rgb.png", "range.png", "instance.png", "meta.json"]
+            .map(|file| std::fs::read(folder.path().join("view").join(file)).unwrap())
+    };
+    let plain = render(&["--camera", "ideal"]);
+    let mut seen = vec![plain[0].clone()];
+    for look in [
+        &["--camera", "cheap"][..],
+        &["--camera", "cheap", "--seed", "1"],
+        &["--camera", "dirty"],
+        &["--light", "night", "--camera", "night"],
+        &["--light", "glare"],
+    ] {
+        let [rgb, range, instance, meta] = render(look);
+        assert!(!seen.contains(&rgb), "{look:?}: a look of its own");
+        assert!(range == plain[1] && instance == plain[2], "{look:?}: truth stays exact");
+        let meta: Value = serde_json::from_slice(&meta).unwrap();
+        assert_eq!(meta[look[0].trim_start_matches('-')], look[1]);
+        seen.push(rgb);
+    }
+    assert!(render(&["--camera", "cheap", "--seed", "1"])[0] == seen[2], "the same seed, the same noise");
 }
 
 #[test]

@@ -4,11 +4,13 @@
 
 use parry2d::math::{Pose as ParryPose, Vector};
 use parry2d::query::{Ray, RayCast};
-use parry2d::shape::{Ball, ConvexPolygon, Segment};
-use wayhome::geometry::{Pose, direction};
-use wayhome::panorama::{INSTANCE_CEILING, INSTANCE_FLOOR, Panorama, Projection};
+use parry2d::shape::{ConvexPolygon, Cuboid, Segment, SharedShape};
+use wayhome::geometry::{Pose, Vector2, direction};
+use wayhome::panorama::{INSTANCE_CEILING, INSTANCE_FLOOR, Panorama, Projection, ProjectionKind};
+use wayhome::random::Seed;
 use wayhome::render::{CpuRenderer, Renderer, SHADER, Scene, View};
-use wayhome::world::{Footprint, World};
+use wayhome::world::spec::LightSpec;
+use wayhome::world::{Body, Footprint, Window, World, WorldSpec};
 
 /// An L-shaped room with bodies of every shape, as high as the room.
 const HALL: &str = r#"
@@ -50,57 +52,120 @@ fn render(world: &World, projection: Projection, robot: Pose) -> Panorama {
     out
 }
 
-/// Range and instance of what a horizontal ray meets, by parry2d.
-fn cast(world: &World, origin: Pose, azimuth: f64) -> (f32, u16) {
-    let d = direction(azimuth);
-    let ray = Ray::new(Vector::new(origin.x as f32, origin.y as f32), Vector::new(d.x as f32, d.y as f32));
-    let mut nearest = (f32::MAX, 0);
-    let mut offer = |range: Option<f32>, instance: u16| {
-        if let Some(range) = range.filter(|r| *r < nearest.0) {
-            nearest = (range, instance);
-        }
-    };
-    let corner = |k: usize| {
-        let p = world.outline[k % world.outline.len()];
-        Vector::new(p.x as f32, p.y as f32)
-    };
-    for k in 0..world.outline.len() {
-        let wall = Segment::new(corner(k), corner(k + 1));
-        offer(wall.cast_ray(&ParryPose::identity(), &ray, 100.0, true), world.wall_instance(k));
-    }
-    for body in &world.bodies {
-        let p = body.pose;
-        let at = ParryPose::new(Vector::new(p.x as f32, p.y as f32), p.heading as f32);
-        let range = match &body.footprint {
-            Footprint::Disc(radius) => Ball::new(*radius as f32).cast_ray(&at, &ray, 100.0, true),
-            Footprint::Polygon(corners) => {
-                let corners = corners.iter().map(|c| Vector::new(c.x as f32, c.y as f32)).collect();
-                ConvexPolygon::from_convex_polyline(corners).unwrap().cast_ray(&at, &ray, 100.0, true)
-            }
+/// Everything that stands in a room as shapes of parry2d, with instance and heights.
+struct Shapes {
+    walls: Vec<(Segment, u16)>,
+    bodies: Vec<(SharedShape, ParryPose, u16, [f32; 2])>,
+}
+
+impl Shapes {
+    fn of(world: &World, poses: &[Pose]) -> Self {
+        let point = |p: &Vector2<f64>| Vector::new(p.x as f32, p.y as f32);
+        let n = world.outline.len();
+        let corner = |k: usize| point(&world.outline[k % n]);
+        let walls = (0..n).map(|k| (Segment::new(corner(k), corner(k + 1)), world.wall_instance(k))).collect();
+        let polygon = |corners: &[Vector2<f64>]| {
+            SharedShape::new(ConvexPolygon::from_convex_polyline(corners.iter().map(point).collect()).unwrap())
         };
-        offer(range, body.instance);
+        let body = |(b, pose): (&Body, &Pose)| {
+            let shape = match &b.footprint {
+                Footprint::Disc(radius) => SharedShape::ball(*radius as f32),
+                Footprint::Polygon(corners) => polygon(corners),
+            };
+            let at = ParryPose::new(point(&pose.position()), pose.heading as f32);
+            (shape, at, b.instance, [b.bottom_m as f32, b.top_m as f32])
+        };
+        let window =
+            |w: &Window| (polygon(&w.footprint), ParryPose::identity(), w.instance, [w.bottom_m as f32, w.top_m as f32]);
+        let bodies = world.bodies.iter().zip(poses).map(body).chain(world.windows.iter().map(window)).collect();
+        Self { walls, bodies }
     }
-    nearest
+
+    /// What the upright plane through the camera at `azimuth` cuts: bodies as boxes of near, far, bottom and top, and the wall
+    /// behind them.
+    fn cut(&self, camera: Vector2<f64>, azimuth: f64) -> (Vec<([f32; 4], u16)>, f32, u16) {
+        const REACH: f32 = 30.0;
+        let d = direction(azimuth);
+        let (origin, d) = (Vector::new(camera.x as f32, camera.y as f32), Vector::new(d.x as f32, d.y as f32));
+        let (ray, back) = (Ray::new(origin, d), Ray::new(origin + d * REACH, -d));
+        let walls = self
+            .walls
+            .iter()
+            .filter_map(|(wall, instance)| Some((wall.cast_ray(&ParryPose::identity(), &ray, REACH, true)?, *instance)));
+        let (wall, instance) = walls.min_by(|a, b| a.0.total_cmp(&b.0)).unwrap();
+        let boxes = self.bodies.iter().filter_map(|(shape, at, instance, [bottom, top])| {
+            let near = shape.cast_ray(at, &ray, REACH, true)?;
+            let far = REACH - shape.cast_ray(at, &back, REACH, true)?;
+            Some(([near, far, *bottom, *top], *instance))
+        });
+        (boxes.collect(), wall, instance)
+    }
+}
+
+/// Range and instance of what a ray at `azimuth` and `tan` of elevation meets, by parry2d: first in the floor plan, then in the
+/// upright plane of the ray.
+fn cast(world: &World, shapes: &Shapes, robot: Pose, azimuth: f64, tan: f64) -> (f32, u16) {
+    let (boxes, wall, wall_instance) = shapes.cut(world.camera_pose(&robot).position(), azimuth);
+    let eye = Vector::new(0.0, world.spec.camera.height_m as f32);
+    let length = (1.0 + tan * tan).sqrt();
+    let ray = Ray::new(eye, Vector::new((1.0 / length) as f32, (tan / length) as f32));
+    let height = world.spec.room.height_m as f32;
+    let line = |x0, y0, x1, y1| Segment::new(Vector::new(x0, y0), Vector::new(x1, y1));
+    let room = [
+        (line(0.0, 0.0, wall, 0.0), INSTANCE_FLOOR),
+        (line(0.0, height, wall, height), INSTANCE_CEILING),
+        (line(wall, -0.1, wall, height + 0.1), wall_instance),
+    ];
+    let room = room.iter().filter_map(|(s, id)| Some((s.cast_ray(&ParryPose::identity(), &ray, 100.0, true)?, *id)));
+    let bodies = boxes.iter().filter_map(|([near, far, bottom, top], id)| {
+        let half = Vector::new(0.5 * (far - near), 0.5 * (top - bottom));
+        let at = ParryPose::new(Vector::new(0.5 * (near + far), 0.5 * (bottom + top)), 0.0);
+        Some((Cuboid::new(half).cast_ray(&at, &ray, 100.0, true)?, *id))
+    });
+    room.chain(bodies).min_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or((f32::MAX, 0))
 }
 
 #[test]
-fn horizon_agrees_with_parrys_ray_cast() {
-    let world = world(HALL);
-    let projection = Projection { mount_rad: 0.2, ..Projection::new(1440, 31) };
-    let horizon = 15;
-    assert_eq!(projection.tan_elevation(f64::from(horizon)), 0.0);
-    for robot in [Pose::new(0.0, -1.0, 0.3), Pose::new(-3.5, 2.5, -2.0), Pose::new(3.7, 0.3, 1.0)] {
-        let picture = render(&world, projection, robot);
-        for column in 0..projection.width {
-            let at = (horizon * projection.width + column) as usize;
-            let seen = (picture.range_m[at], picture.instance[at]);
-            let azimuth = robot.heading + projection.azimuth(f64::from(column));
-            // At an outline, either side of it will do.
-            let allowed = [0.0, -2e-5, 2e-5].map(|e| cast(&world, robot, azimuth + e));
-            let agrees = |a: &(f32, u16)| a.1 == seen.1 && (a.0 - seen.0).abs() < 3e-4 * a.0.max(1.0);
-            assert!(allowed.iter().any(agrees), "column {column} of {robot:?}: {seen:?} not in {allowed:?}");
+fn every_pixel_sees_what_parrys_rays_meet() {
+    let built_in = World::builtin_names().into_iter().map(|name| World::open(name).unwrap());
+    let mut stream = Seed(4).stream("poses");
+    let (mut pixels, mut at_outlines) = (0, 0);
+    for world in built_in.chain([world(HALL), world(STACK)]) {
+        // What can move has moved.
+        let moved = |b: &Body| {
+            if b.motion.is_some() { Pose::new(b.pose.x + 0.1, b.pose.y - 0.2, b.pose.heading + 0.7) } else { b.pose }
+        };
+        let bodies: Vec<Pose> = world.bodies.iter().map(moved).collect();
+        let shapes = Shapes::of(&world, &bodies);
+        for kind in [ProjectionKind::Cylindrical, ProjectionKind::EqualAngle] {
+            let robot = Pose { heading: 0.3, ..world.random_start(&mut stream).unwrap_or(world.home) };
+            let projection = Projection { mount_rad: 0.2, kind, ..world.projection_of_size(200, 80) };
+            let mut picture = Panorama::black(projection);
+            let view = View { projection, robot, bodies: &bodies };
+            CpuRenderer::new().render(&Scene::new(&world).unwrap(), &view, &mut picture).unwrap();
+            for k in 0..projection.pixels() {
+                let (column, row) = (k as u32 % projection.width, k as u32 / projection.width);
+                let azimuth = robot.heading + projection.azimuth(f64::from(column));
+                let tan = projection.tan_elevation(f64::from(row));
+                let seen = (picture.range_m[k], picture.instance[k]);
+                let agrees = |a: (f32, u16)| a.1 == seen.1 && (a.0 - seen.0).abs() < 1e-4 * a.0.max(1.0);
+                pixels += 1;
+                if agrees(cast(&world, &shapes, robot, azimuth, tan)) {
+                    continue;
+                }
+                // At an outline either side of it will do, and at a grazing angle parry's f32 is good for some 1e-6 rad.
+                at_outlines += 1;
+                let near = |e: f64, f: f64| cast(&world, &shapes, robot, azimuth + 3e-5 * e, tan + 3e-5 * f);
+                let around = [-1.0, 0.0, 1.0].map(|e| [-1.0, 0.0, 1.0].map(|f| near(e, f)));
+                let same = || around.iter().flatten().filter(|a| a.1 == seen.1).map(|a| a.0);
+                let (low, high) = (same().fold(f32::MAX, f32::min), same().fold(0.0, f32::max));
+                let found = (low * 0.9999..=high * 1.0001).contains(&seen.0);
+                assert!(found, "{}: column {column}, row {row} of {robot:?}: {seen:?}, not {around:?}", world.spec.name);
+            }
         }
     }
+    eprintln!("{pixels} pixels, {at_outlines} of them at outlines");
+    assert!(at_outlines * 1000 < pixels);
 }
 
 #[test]
@@ -205,4 +270,87 @@ fn a_view_that_cannot_be_is_refused() {
     assert!(message(View { bodies: &bodies[1..], ..good }).contains("found 2, allowed is 3"));
     assert!(message(View { projection: Projection::new(0, 8), ..good }).contains("0 x 8"));
     assert!(message(View { robot: Pose { x: f64::NAN, ..good.robot }, ..good }).contains("NaN"));
+    let mut poses = bodies.clone();
+    poses[1].heading = f64::NAN;
+    assert!(message(View { bodies: &poses, ..good }).contains("pose of body `rack`"));
+    for (k, name) in ["pillar", "rack", "wedge"].into_iter().enumerate() {
+        assert!(message(View { robot: bodies[k], ..good }).contains(&format!("inside `{name}`")), "{name}");
+    }
+    let sphere = Projection { kind: ProjectionKind::EqualAngle, ..Projection::new(80, 41) };
+    assert!(message(View { projection: sphere, ..good }).contains("up to 92.2 degrees"));
+}
+
+/// A room of 6 x 6 m, white, with the camera at 1.25 m in its middle.
+fn white_room(light: &str) -> World {
+    let white = "{ family = \"plain\", colour = [255, 255, 255] }";
+    world(&format!(
+        "name = \"white\"\nhome = {{ x_m = 3, y_m = 3 }}\nrobot = {{ height_m = 1 }}\n[camera]\nheight_m = 1.25\nhorizon = 0.5\n\
+         [room]\noutline_m = [[0, 0], [6, 0], [6, 6], [0, 6]]\nwalls = [{white}]\nfloor = {white}\nceiling = {white}\n\
+         [light]\nambient = 0\n{light}\n"
+    ))
+}
+
+/// Level of the pixel at the horizon that looks along `azimuth`.
+fn level_at(picture: &Panorama, azimuth: f64) -> f64 {
+    let p = picture.projection;
+    let at = p.height as usize / 2 * p.width as usize + (p.column(azimuth) + 0.5) as usize % p.width as usize;
+    f64::from(picture.rgba[4 * at])
+}
+
+#[test]
+fn lamps_shine_by_the_inverse_square_and_lamberts_law() {
+    let world = white_room("lamps = [{ position_m = [3, 4, 1.25], intensity = 3 }]");
+    let picture = render(&world, Projection::new(720, 91), world.home);
+    for degrees in [90.0_f64, 75.0, 60.0, 50.0] {
+        // A point on the wall at y = 6, 2 m behind the lamp.
+        let aside = 3.0 / degrees.to_radians().tan();
+        let square = 4.0 + aside * aside;
+        let wanted = 255.0 * 3.0 * (2.0 / square.sqrt()) / square;
+        let seen = level_at(&picture, degrees.to_radians());
+        assert!((seen - wanted).abs() < 1.5, "{degrees}: {seen}, {wanted}");
+    }
+}
+
+#[test]
+fn a_window_lights_a_wall_as_a_rectangle_of_even_radiance() {
+    let world = white_room("windows = [{ wall = 0, along_m = [2, 4], height_m = [0.25, 2.25], brightness = 6 }]");
+    let picture = render(&world, Projection::new(720, 91), world.home);
+    // Four rectangles of 1 x 1 m meet at the foot of the normal of a point 5.99 m away; each has the configuration factor of a
+    // rectangle over whose corner an element stands (Howell, A Catalog of Radiation Heat Transfer Configuration Factors, B-3).
+    let a = 1.0 / 5.99_f64;
+    let side = a / (1.0 + a * a).sqrt();
+    let factor = (2.0 * side * side.atan()) / std::f64::consts::TAU;
+    let wanted = 255.0 * 6.0 * std::f64::consts::PI * 4.0 * factor;
+    let seen = level_at(&picture, 90_f64.to_radians());
+    assert!((seen / wanted - 1.0).abs() < 0.02, "{seen}, {wanted}");
+    // The window itself is seen, brighter than white, and the wall around it gets nothing of its light.
+    assert_eq!(level_at(&picture, -90_f64.to_radians()), 255.0);
+    assert!(picture.instance.contains(&world.windows[0].instance));
+    assert_eq!(level_at(&picture, -60_f64.to_radians()), 0.0);
+}
+
+#[test]
+fn corners_are_darker_and_no_light_comes_from_nowhere() {
+    let world = white_room("corner_shade = 0.5\ncorner_reach_m = 1");
+    let ambient = World::from_spec(
+        &WorldSpec { light: LightSpec { ambient: 0.8, ..world.spec.light.clone() }, ..world.spec.clone() },
+        "test",
+    )
+    .unwrap();
+    let picture = render(&ambient, Projection::new(720, 181), world.home);
+    // 255 * 0.8 in the open, half of it in the corner; half a metre from it a quarter of the shade.
+    assert_eq!(level_at(&picture, 0.0), 204.0);
+    assert!((level_at(&picture, 45_f64.to_radians() + 1e-9) - 102.0).abs() < 6.0);
+    assert!((level_at(&picture, (2.5 / 3.0_f64).atan()) - 204.0 * (1.0 - 0.5 * 0.25)).abs() < 2.0);
+    assert!(render(&world, Projection::new(64, 9), world.home).rgba.chunks(4).all(|p| p == [0, 0, 0, 255]));
+}
+
+#[test]
+fn an_offset_camera_sees_what_a_robot_there_would() {
+    let mut spec = world(HALL).spec;
+    spec.camera.offset_m = [0.1, -0.05];
+    let aside = World::from_spec(&spec, "test").unwrap();
+    let robot = Pose::new(-0.5, -1.2, 0.7);
+    let projection = Projection::new(300, 60);
+    assert!(render(&aside, projection, robot) == render(&world(HALL), projection, aside.camera_pose(&robot)));
 }

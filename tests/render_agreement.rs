@@ -1,20 +1,21 @@
-//! The GPU renderer against its CPU twin.
+//! The GPU renderer against its CPU twin: all built-in worlds and two more, under all lights and through all cameras but for
+//! their noise, from random poses.
 //!
 //! Where there is no adapter this says loudly that it did not run, and fails if `WAYHOME_REQUIRE_GPU` is 1. A comparison that
 //! fails leaves both pictures and their difference in the folder for temporary files, and says where.
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::{Mutex, MutexGuard, OnceLock};
 
 use rand_pcg::rand_core::Rng;
 use wayhome::Error;
-use wayhome::geometry::{Pose, Vector2};
-use wayhome::panorama::{Panorama, Projection};
+use wayhome::geometry::{Pose, Twist, Vector2};
+use wayhome::panorama::{Panorama, Projection, ProjectionKind};
 use wayhome::random::{Seed, Stream};
-use wayhome::render::{CpuRenderer, GpuRenderer, Renderer, Scene, View};
-use wayhome::world::World;
+use wayhome::render::{Camera, CpuRenderer, GpuRenderer, Renderer, Scene, View};
+use wayhome::world::{CameraPreset, LightPreset, OpticsSpec, World};
 
 /// Most pixels whose instance or range may differ, as a share: outlines, where the last bit decides.
 const OUTLINES: f64 = 1e-3;
@@ -176,27 +177,39 @@ fn keep_evidence(name: &str, cpu: &Panorama, gpu: &Panorama) -> PathBuf {
 fn gpu_and_cpu_agree() {
     let Some(mut gpu) = device() else { return };
     let mut cpu = CpuRenderer::new();
-    let file = |name: &str| World::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("worlds").join(name)).unwrap();
     let text = |text: &str| World::from_toml(text, "test").unwrap();
     let mut stream = Seed(1).stream("agreement");
     let (mut worst, mut total, mut pictures) = ((0.0_f64, 0.0_f64), (0.0, 0.0), 0.0);
-    for world in [file("lab.toml"), file("crowd.toml"), text(CELLAR), text(&forest())] {
+    let (mut bytes, mut unequal) = (0, 0);
+    let builtin = World::builtin_names().into_iter().map(|name| World::open(name).unwrap());
+    for world in builtin.chain([text(CELLAR), text(&forest())]) {
         let name = world.spec.name.clone();
         let scene = Scene::new(&world).unwrap();
-        for k in 0..24 {
+        for k in 0..LightPreset::ALL.len() * CameraPreset::ALL.len() {
             // Sizes that are no multiple of a workgroup or a band, too.
             let (width, height) = [(561, 81), (720, 90), (1000, 130)][k % 3];
-            let projection = Projection { mount_rad: 0.1 * k as f64, ..world.projection_of_size(width, height) };
+            let kind = if k % 4 == 1 { ProjectionKind::EqualAngle } else { world.spec.camera.projection };
+            let mount_rad = 0.1 * k as f64;
+            let projection = Projection { mount_rad, kind, ..world.projection_of_size(width, height) };
+            let light = LightPreset::ALL[k % LightPreset::ALL.len()];
+            let optics = OpticsSpec { noise: None, ..CameraPreset::ALL[k / LightPreset::ALL.len()].optics() };
+            let scene = scene.under(light, optics.exposure);
             let (robot, bodies) = free_pose(&world, &mut stream);
             let view = View { projection, robot, bodies: &bodies };
-            let (mut a, mut b) = (Panorama::black(projection), Panorama::black(Projection::new(4, 4)));
-            cpu.render(&scene, &view, &mut a).unwrap();
-            gpu.render(&scene, &view, &mut b).unwrap();
+            let twist = Twist { v: 0.3, omega: 0.5 };
+            let take = |renderer: &mut dyn Renderer| {
+                let mut out = Panorama::black(Projection::new(4, 4));
+                Camera::new(optics).take(renderer, &scene, &view, twist, Seed(0), &mut out).unwrap();
+                out
+            };
+            let (a, b) = (take(&mut cpu), take(&mut *gpu));
+            bytes += a.rgba.len();
+            unequal += a.rgba.iter().zip(&b.rgba).filter(|(a, b)| a != b).count();
             let (outlines, colours) = differences(&a, &b);
             if outlines > OUTLINES || colours > COLOURS {
                 let folder = keep_evidence(&format!("{name}-{k}"), &a, &b);
                 panic!(
-                    "{name}, picture {k} at {:?}: {outlines:.5} of the pixels differ in instance or range, {colours:.5} in \
+                    "{name}, picture {k} ({light:?}, {optics:?}) at {:?}: {outlines:.5} of the pixels differ in instance or range, {colours:.5} in \
                      colour; see {}",
                     view.robot,
                     folder.display()
@@ -208,7 +221,8 @@ fn gpu_and_cpu_agree() {
         }
     }
     eprintln!(
-        "{}: outlines differ in {:.6} of the pixels (worst {:.6}), colours in {:.6} (worst {:.6})",
+        "{}: {pictures} pictures; outlines differ in {:.6} of the pixels (worst {:.6}), colours in {:.6} (worst {:.6}), and \
+         {unequal} of {bytes} bytes of colour at all",
         gpu.info().adapter,
         total.0 / pictures,
         worst.0,

@@ -100,6 +100,26 @@ const SPOILT: &[(&str, &str, &str, &str)] = &[
     ("friction = 0.7", "friction = -0.7", "floor.friction", "-0.7"),
     ("[[0.5, 0.5], [1.5, 0.5]", "[[-0.5, 0.5], [1.5, 0.5]", "floor.zones[0].polygon_m", "leaves the room"),
     ("[1.0, 1.0, 2.4]", "[1.0, 1.0, 2.6]", "light.lamps[0].position_m", "2.6"),
+    ("[light]", "[light]\npreset = \"dusk\"", "light.preset", "\"dusk\""),
+    ("[light]", "[light]\ncorner_shade = 1.5", "light.corner_shade", "1.5"),
+    (
+        "[light]",
+        "[light]\nwindows = [{ wall = 4, along_m = [1, 2], height_m = [1, 2], brightness = 1 }]",
+        "light.windows[0].wall",
+        "4",
+    ),
+    (
+        "[light]",
+        "[light]\nwindows = [{ wall = 1, along_m = [1, 3.5], height_m = [1, 2], brightness = 1 }]",
+        "light.windows[0].along_m",
+        "[1, 3.5]",
+    ),
+    (
+        "[light]",
+        "[light]\nwindows = [{ wall = 1, along_m = [1, 2], height_m = [2, 1], brightness = 1 }]",
+        "light.windows[0].height_m",
+        "[2, 1]",
+    ),
     // Bodies.
     ("radius_m = 0.2", "radius_m = 0.0", "landmarks[0].shape.disc.radius_m", "0"),
     ("size_m = [1.0, 0.5]", "size_m = [1.0, -0.5]", "landmarks[1].shape.box.size_m[1]", "-0.5"),
@@ -140,6 +160,10 @@ const SPOILT: &[(&str, &str, &str, &str)] = &[
     ("caster_m = 0.125", "encoder_counts_per_turn = 0.0", "robot.encoder_counts_per_turn", "0"),
     ("caster_m = 0.125", "max_speed_m_s = 1.0", "robot.max_speed_m_s", "1"),
     ("width_px = 720", "width_px = 8", "camera.width_px", "8"),
+    ("width_px = 720", "width_px = 720\noffset_m = [0.3, 0.0]", "camera.offset_m", "[0.3, 0]"),
+    ("width_px = 720", "width_px = 720\npreset = \"lens\"", "camera.preset", "\"lens\""),
+    ("width_px = 720", "width_px = 720\noptics = { white_balance = [1, 1, 11] }", "camera.optics.white_balance[2]", "11"),
+    ("width_px = 720", "width_px = 300\nprojection = \"equal-angle\"", "camera.height_px", "129.6 degrees"),
     ("width_px = 720", "height_m = 2.5", "camera.height_m", "2.5"),
     ("width_px = 720", "horizon = 1.2", "camera.horizon", "1.2"),
     ("speed_m_s = 0.3\n", "speed_m_s = 0.4\n", "task.speed_m_s", "0.4"),
@@ -215,7 +239,7 @@ fn built_in_worlds_survive_a_round_trip_through_json() {
         assert_eq!(world.spec.name, name);
         assert_eq!(world.source.to_str(), Some(format!("builtin:{name}").as_str()));
         let json = serde_json::to_string_pretty(&world.spec).expect("JSON");
-        let mut back = World::from_json(&json, "copy.json").expect(name);
+        let mut back = World::from_json(&json, "worlds/copy.json").expect(name);
         assert_ne!(back.sha256, world.sha256, "another file");
         (back.source, back.sha256) = (world.source.clone(), world.sha256.clone());
         assert_eq!(back, world);
@@ -342,10 +366,10 @@ fn walls_keep_their_textures_in_a_clockwise_room() {
     // As written, wall 1 is the east wall there and the west wall here.
     let family_at = |world: &World, x: f64, y: f64| {
         let k = (0..4).find(|&k| (0.5 * (world.wall(k).0 + world.wall(k).1) - Vector2::new(x, y)).norm() < 1e-9).expect("wall");
-        format!("{:?}", world.wall_textures[k].family)
+        format!("{:?}", world.wall_textures[k].pattern)
     };
-    assert_eq!([family_at(&there, 2.0, 0.0), family_at(&there, 4.0, 1.5)], ["Brick", "Tiles"]);
-    assert_eq!([family_at(&back, 2.0, 0.0), family_at(&back, 0.0, 1.5)], ["Brick", "Tiles"]);
+    assert_eq!([family_at(&there, 2.0, 0.0), family_at(&there, 4.0, 1.5)], ["Family(Brick)", "Family(Tiles)"]);
+    assert_eq!([family_at(&back, 2.0, 0.0), family_at(&back, 0.0, 1.5)], ["Family(Brick)", "Family(Tiles)"]);
 }
 
 #[test]

@@ -6,10 +6,11 @@ use std::path::PathBuf;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Parser, Subcommand};
 use wayhome::episode::method::{LawKind, MethodKind};
-use wayhome::episode::{Bearings, PlantKind, Start};
+use wayhome::episode::{Bearings, Look, PlantKind, Start};
 use wayhome::geometry::Pose;
 use wayhome::render::RendererChoice;
 use wayhome::study::robustness::Axis;
+use wayhome::world::{CameraPreset, LightPreset};
 
 /// Shown under every `--help`.
 const EXIT_CODES: &str = "Exit codes:
@@ -107,6 +108,14 @@ pub struct HomeArgs {
     /// Columns and rows of the panorama, 16x8 to 16384x4096 [default: the world's]
     #[arg(long, value_name = "WxH", value_parser = size)]
     pub size: Option<(u32, u32)>,
+    #[command(flatten)]
+    pub look: LookArgs,
+    /// Light at home, if another than on the way
+    #[arg(long, value_parser = choice(LIGHTS))]
+    pub home_light: Option<LightPreset>,
+    /// Camera at home, if another than on the way
+    #[arg(long, value_parser = choice(CAMERAS))]
+    pub home_camera: Option<CameraPreset>,
     /// Start: `random`, the name of one of the world's starts, or a pose x,y,heading_deg
     #[arg(long, default_value = "random", allow_hyphen_values = true, value_parser = start)]
     pub start: Start,
@@ -134,6 +143,24 @@ pub struct HomeArgs {
     /// Folder for the results [default: results/runs/home-WORLD-SEED]
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
+}
+
+/// Light and camera of rendered panoramas.
+#[derive(Debug, Clone, Copy, clap::Args)]
+pub struct LookArgs {
+    /// Light [default: the world's]
+    #[arg(long, value_parser = choice(LIGHTS))]
+    pub light: Option<LightPreset>,
+    /// What the camera does to a picture [default: as the world says]
+    #[arg(long, value_parser = choice(CAMERAS))]
+    pub camera: Option<CameraPreset>,
+}
+
+impl LookArgs {
+    /// What they stand for.
+    pub fn look(&self) -> Look {
+        Look { light: self.light, camera: self.camera }
+    }
 }
 
 /// Arguments of `drive`.
@@ -232,6 +259,11 @@ pub struct RenderArgs {
     /// Pose of the robot that carries the camera
     #[arg(long, value_name = "x,y,heading_deg", allow_hyphen_values = true, value_parser = pose)]
     pub pose: Pose,
+    #[command(flatten)]
+    pub look: LookArgs,
+    /// Seed of the camera's noise
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub seed: u64,
     /// Columns and rows of the panorama, 16x8 to 16384x4096 [default: the world's]
     #[arg(long, value_name = "WxH", value_parser = size)]
     pub size: Option<(u32, u32)>,
@@ -299,6 +331,22 @@ const RENDERERS: &[Choice<RendererChoice>] = &[
     (RendererChoice::Auto, "auto", "A hardware GPU where there is one, else the CPU"),
     (RendererChoice::Gpu, "gpu", "Any graphics adapter, a software one included"),
     (RendererChoice::Cpu, "cpu", "The CPU"),
+];
+
+const LIGHTS: &[Choice<LightPreset>] = &[
+    (LightPreset::Day, "day", "As the world has it"),
+    (LightPreset::Overcast, "overcast", "Rain outside, lamps off"),
+    (LightPreset::Glare, "glare", "Low sun in the windows"),
+    (LightPreset::Evening, "evening", "Lamps on, dusk outside"),
+    (LightPreset::Night, "night", "A few lamps left on"),
+];
+
+const CAMERAS: &[Choice<CameraPreset>] = &[
+    (CameraPreset::Ideal, "ideal", "Colours as they are"),
+    (CameraPreset::Decent, "decent", "A good industrial camera: little noise, a short shutter"),
+    (CameraPreset::Cheap, "cheap", "Noise, soft focus, dark rims, a warm cast"),
+    (CameraPreset::Dirty, "dirty", "A decent one behind dust and splashes"),
+    (CameraPreset::Night, "night", "Four times the exposure: a long shutter, amplified noise"),
 ];
 
 const AXES: &[Choice<Axis>] = &[
@@ -423,6 +471,10 @@ mod tests {
         check(METHODS);
         check(LAWS);
         check(AXES);
+        check(LIGHTS);
+        check(CAMERAS);
+        assert!(LightPreset::ALL.iter().all(|one| LIGHTS.iter().any(|(light, ..)| light == one)));
+        assert!(CameraPreset::ALL.iter().all(|one| CAMERAS.iter().any(|(camera, ..)| camera == one)));
         assert!(AXES.iter().all(|(axis, name, _)| axis.name() == *name));
     }
 

@@ -7,7 +7,7 @@ use anyhow::Result;
 use serde::Serialize;
 use wayhome::Error;
 use wayhome::episode::sensor::Noise;
-use wayhome::episode::{Bearings, Bench, Outcome, Setup, Summary};
+use wayhome::episode::{Bearings, Bench, Look, Outcome, Setup, Summary};
 use wayhome::report::{OutputFolder, run as run_report, seeds as seeds_report, text};
 use wayhome::study::seeds::{SeedEvent, SeedsSummary, run_seeds};
 use wayhome::world::World;
@@ -92,6 +92,8 @@ fn setup(args: &HomeArgs) -> Result<Setup, Error> {
     let noisy = args.noise_deg.is_some() || args.noise_dropout.is_some() || args.noise_false.is_some();
     needs_bearings(noisy, "--noise-*", args.bearings, Bearings::Noisy)?;
     needs_bearings(args.size.is_some(), "--size", args.bearings, Bearings::Rendered)?;
+    let (look, home_look) = (args.look.look(), Look { light: args.home_light, camera: args.home_camera });
+    needs_bearings(look.or(home_look) != Look::default(), "--light and --camera", args.bearings, Bearings::Rendered)?;
     let usual = Noise::default();
     Ok(Setup {
         plant: args.plant,
@@ -100,6 +102,8 @@ fn setup(args: &HomeArgs) -> Result<Setup, Error> {
         law: args.controller,
         renderer: args.renderer,
         size_px: args.size,
+        look,
+        home_look,
         noise: Noise {
             sd_rad: args.noise_deg.map_or(usual.sd_rad, f64::to_radians),
             dropout: args.noise_dropout.unwrap_or(usual.dropout),

@@ -4,12 +4,13 @@ use anyhow::Result;
 use serde::Serialize;
 use wayhome::Error;
 use wayhome::episode::PoseRecord;
-use wayhome::geometry::Pose;
-use wayhome::panorama::{INSTANCE_CEILING, INSTANCE_FLOOR, Panorama, Projection};
-use wayhome::render::{self, RendererInfo, Scene, View};
+use wayhome::geometry::{Pose, Twist};
+use wayhome::panorama::{Panorama, Projection};
+use wayhome::random::Seed;
+use wayhome::render::{self, Camera, RendererInfo, Scene, View};
 use wayhome::report::OutputFolder;
 use wayhome::report::image::{colours_png, instance_png, range_png};
-use wayhome::world::{Footprint, World, polygon};
+use wayhome::world::{CameraPreset, Footprint, LightPreset, OpticsSpec, World, polygon};
 
 use super::Verdict;
 use super::args::RenderArgs;
@@ -24,6 +25,10 @@ struct Meta<'a> {
     pose: PoseRecord,
     projection: Projection,
     camera_height_m: f64,
+    light: LightPreset,
+    camera: CameraPreset,
+    optics: OpticsSpec,
+    seed: u64,
     range_unit: &'static str,
     instances: Vec<Instance>,
     renderer: &'a RendererInfo,
@@ -56,13 +61,20 @@ pub fn run(args: &RenderArgs, context: &Context) -> Result<Verdict> {
     let mut renderer = render::create(args.renderer)?;
     let mut panorama = Panorama::black(projection);
     let view = View { projection, robot: args.pose, bodies: &world.body_poses() };
-    renderer.render(&Scene::new(&world)?, &view, &mut panorama)?;
+    let look = args.look.look();
+    let scene = look.scene(&Scene::new(&world)?, &world);
+    let optics = look.optics(&world);
+    Camera::new(optics).take(renderer.as_mut(), &scene, &view, Twist::default(), Seed(args.seed), &mut panorama)?;
 
     let meta = Meta {
         pose: args.pose.into(),
         projection,
         camera_height_m: world.spec.camera.height_m,
         range_unit: "mm; 65535 stands for all that is farther",
+        light: look.light(&world),
+        camera: look.camera(&world),
+        optics,
+        seed: args.seed,
         instances: instances(&world),
         renderer: renderer.info(),
         world: &world.spec.name,
@@ -93,17 +105,18 @@ pub fn run(args: &RenderArgs, context: &Context) -> Result<Verdict> {
 
 /// The camera must be in the room and in no body; the robot's own size does not matter for a picture.
 fn check_place(world: &World, pose: Pose) -> Result<(), Error> {
+    let camera = world.camera_pose(&pose).position();
     let refuse = |reason: String| Error::Invalid {
         what: "--pose".into(),
         found: format!("({}, {}) m, {reason}", pose.x, pose.y),
         allowed: "a place in the room and outside its bodies".into(),
     };
-    if !polygon::contains(&world.outline, pose.position()) {
+    if !polygon::contains(&world.outline, camera) {
         return Err(refuse("outside the room".into()));
     }
     let height_m = world.spec.camera.height_m;
     let within = world.bodies.iter().filter(|b| b.bottom_m <= height_m && height_m <= b.top_m).find(|body| {
-        let point = body.pose.inverse_transform(pose.position());
+        let point = body.pose.inverse_transform(camera);
         match &body.footprint {
             Footprint::Disc(radius_m) => point.norm() <= *radius_m,
             Footprint::Polygon(corners) => polygon::contains(corners, point),
@@ -114,8 +127,5 @@ fn check_place(world: &World, pose: Pose) -> Result<(), Error> {
 
 /// All instance ids of a world's panoramas.
 fn instances(world: &World) -> Vec<Instance> {
-    let surfaces = [(INSTANCE_FLOOR, "floor".to_owned()), (INSTANCE_CEILING, "ceiling".to_owned())];
-    let walls = (0..world.outline.len()).map(|k| (world.wall_instance(k), format!("wall {k}")));
-    let bodies = world.bodies.iter().map(|b| (b.instance, b.name.clone()));
-    surfaces.into_iter().chain(walls).chain(bodies).map(|(id, name)| Instance { id, name }).collect()
+    world.instances().into_iter().map(|(id, name)| Instance { id, name }).collect()
 }

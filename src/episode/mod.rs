@@ -20,5 +20,5 @@ mod summary;
 pub use record::{Outcome, Pictures, Record, Step, Timing};
 pub use run::{Parts, Progress, run};
 pub use sensor::Sensor;
-pub use setup::{Bearings, Bench, PlantKind, Setup, Start};
+pub use setup::{Bearings, Bench, Look, PlantKind, Setup, Start};
 pub use summary::{BeliefError, CollisionRecord, EstimateErrors, Landmarks, PoseRecord, SetupRecord, Summary};

@@ -8,7 +8,7 @@ use serde::Serialize;
 use super::method::{self, LawKind, MethodKind};
 use super::record::Record;
 use super::run::{Parts, Progress, run};
-use super::sensor::{Degradation, DegradedSensor, IdealSensor, Noise, NoisySensor, RenderedSensor, Sensor};
+use super::sensor::{Degradation, DegradedSensor, IdealSensor, Noise, NoisySensor, RenderedSensor, Sensor, Sight};
 use crate::error::{Error, Result};
 use crate::geometry::Pose;
 use crate::observation::{Briefing, HomeSnapshot, RobotSheet, TaskSheet};
@@ -17,7 +17,7 @@ use crate::physics::{Plant, RapierPlant, UnicyclePlant};
 use crate::random::Seed;
 use crate::render::{self, Renderer, RendererChoice, Scene};
 use crate::vision::ExtractorSettings;
-use crate::world::{TaskSpec, World};
+use crate::world::{CameraPreset, LightPreset, OpticsSpec, TaskSpec, World};
 
 /// What moves when the wheels are commanded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -39,6 +39,47 @@ pub enum Bearings {
     Ideal,
     /// Ideal bearings with noise, drop-outs and false matches.
     Noisy,
+}
+
+/// Light and camera of [`Bearings::Rendered`]. What is `None` is as the world has it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Look {
+    /// Light.
+    pub light: Option<LightPreset>,
+    /// Camera.
+    pub camera: Option<CameraPreset>,
+}
+
+impl Look {
+    /// What this look leaves open, taken from `other`.
+    #[must_use]
+    pub fn or(self, other: Self) -> Self {
+        Self { light: self.light.or(other.light), camera: self.camera.or(other.camera) }
+    }
+
+    /// The light that it stands for in `world`.
+    #[must_use]
+    pub fn light(&self, world: &World) -> LightPreset {
+        self.light.unwrap_or(world.spec.light.preset)
+    }
+
+    /// The preset of the camera that it stands for in `world`.
+    #[must_use]
+    pub fn camera(&self, world: &World) -> CameraPreset {
+        self.camera.unwrap_or(world.spec.camera.preset)
+    }
+
+    /// The optics that it stands for in `world`.
+    #[must_use]
+    pub fn optics(&self, world: &World) -> OpticsSpec {
+        self.camera.map_or(world.spec.camera.optics, CameraPreset::optics)
+    }
+
+    /// `scene`, packed from `world`, under this light as this camera is exposed.
+    #[must_use]
+    pub fn scene(&self, scene: &Scene, world: &World) -> Scene {
+        scene.under(self.light(world), self.optics(world).exposure)
+    }
 }
 
 /// Where a run starts.
@@ -67,6 +108,10 @@ pub struct Setup {
     pub renderer: RendererChoice,
     /// Columns and rows of the panorama where they differ from the world's.
     pub size_px: Option<(u32, u32)>,
+    /// Light and camera, for [`Bearings::Rendered`].
+    pub look: Look,
+    /// Light and camera of the home panorama; what is `None` is as in `look`.
+    pub home_look: Look,
     /// Faults of [`Bearings::Noisy`].
     pub noise: Noise,
     /// What is done to the bearings of any sensor on top of that.
@@ -88,6 +133,8 @@ impl Default for Setup {
             law: LawKind::Proportional,
             renderer: RendererChoice::Auto,
             size_px: None,
+            look: Look::default(),
+            home_look: Look::default(),
             noise: Noise::default(),
             degradation: Degradation::default(),
             start: Start::Random,
@@ -109,6 +156,12 @@ impl Setup {
     #[must_use]
     pub fn projection(&self, world: &World) -> Projection {
         self.size_px.map_or_else(|| world.projection(), |(width, height)| world.projection_of_size(width, height))
+    }
+
+    /// Light and camera at home, and on the way.
+    #[must_use]
+    pub fn looks(&self) -> [Look; 2] {
+        [self.home_look.or(self.look), self.look]
     }
 
     /// What a method is told before a run.
@@ -145,7 +198,8 @@ pub struct Bench<'a> {
 
 /// What rendered bearings need, kept from run to run.
 struct Camera {
-    scene: Arc<Scene>,
+    /// The scene as it was at home, and as it is on the way.
+    scenes: [Arc<Scene>; 2],
     renderer: Box<dyn Renderer>,
 }
 
@@ -157,7 +211,9 @@ impl<'a> Bench<'a> {
     pub fn new(world: &'a World, setup: &'a Setup) -> Result<Self> {
         let camera = match setup.bearings {
             Bearings::Rendered => {
-                Some(Camera { scene: Arc::new(Scene::new(world)?), renderer: render::create(setup.renderer)? })
+                let scene = Scene::new(world)?;
+                let scenes = setup.looks().map(|look| Arc::new(look.scene(&scene, world)));
+                Some(Camera { scenes, renderer: render::create(setup.renderer)? })
             }
             Bearings::Ideal | Bearings::Noisy => None,
         };
@@ -170,7 +226,7 @@ impl<'a> Bench<'a> {
     /// When a second renderer cannot be had.
     pub fn another(&self) -> Result<Self> {
         let camera = match &self.camera {
-            Some(camera) => Some(Camera { scene: Arc::clone(&camera.scene), renderer: render::create(self.setup.renderer)? }),
+            Some(camera) => Some(Camera { scenes: camera.scenes.clone(), renderer: render::create(self.setup.renderer)? }),
             None => None,
         };
         Ok(Self { camera, ..*self })
@@ -190,13 +246,13 @@ impl<'a> Bench<'a> {
         };
         let ideal = || IdealSensor::new(world);
         let mut sensor: Box<dyn Sensor + '_> = match &mut self.camera {
-            Some(camera) => Box::new(RenderedSensor::new(
-                world,
-                &camera.scene,
-                camera.renderer.as_mut(),
-                setup.projection(world),
-                ExtractorSettings::default(),
-            )?),
+            Some(Camera { scenes: [home, now], renderer }) => {
+                let [home_look, look] = setup.looks();
+                let sights =
+                    [Sight { scene: home, optics: home_look.optics(world) }, Sight { scene: now, optics: look.optics(world) }];
+                let (projection, settings) = (setup.projection(world), ExtractorSettings::default());
+                Box::new(RenderedSensor::new(world, sights, renderer.as_mut(), projection, settings, seed)?)
+            }
             None if setup.bearings == Bearings::Noisy => {
                 Box::new(NoisySensor::new(ideal(), world.landmark_count, setup.noise, seed))
             }

@@ -10,7 +10,7 @@ use crate::geometry::{Pose, angle_of, wrap};
 use crate::observation::Estimate;
 use crate::physics::Collision;
 use crate::render::RendererInfo;
-use crate::world::World;
+use crate::world::{CameraPreset, LightPreset, World};
 
 /// An episode in numbers. Everything but `timing` (and the renderer's names) depends on the world, the settings and the seed
 /// alone. A number that does not exist for the run is `None`, which JSON shows as `null`.
@@ -116,6 +116,10 @@ pub struct SetupRecord {
     pub controller: LawKind,
     /// Columns and rows of the panorama; `None` for a sensor without a camera.
     pub size_px: Option<[u32; 2]>,
+    /// Light at home and on the way; `None` for a sensor without a camera.
+    pub light: Option<[LightPreset; 2]>,
+    /// Camera at home and on the way; `None` for a sensor without a camera.
+    pub camera: Option<[CameraPreset; 2]>,
     /// Cruising speed, m/s.
     pub speed_m_s: f64,
     /// Arrival radius, m.
@@ -130,12 +134,15 @@ impl SetupRecord {
     pub fn new(setup: &Setup, world: &World) -> Self {
         let task = setup.task(world);
         let projection = setup.projection(world);
+        let rendered = setup.bearings == Bearings::Rendered;
         Self {
             plant: setup.plant,
             bearings: setup.bearings,
             method: setup.method,
             controller: setup.law,
-            size_px: (setup.bearings == Bearings::Rendered).then_some([projection.width, projection.height]),
+            size_px: rendered.then_some([projection.width, projection.height]),
+            light: rendered.then(|| setup.looks().map(|look| look.light(world))),
+            camera: rendered.then(|| setup.looks().map(|look| look.camera(world))),
             speed_m_s: task.speed_m_s,
             arrival_radius_m: task.arrival_radius_m,
             time_limit_s: task.time_limit_s,

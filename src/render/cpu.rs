@@ -358,7 +358,7 @@ fn show_row(band: &mut Band<'_>, desk: &mut Desk, number: usize) {
             let plane = Plane::new(band.scene, frame, level.surface, level.face == Face::Underside);
             let height = plane.height() - frame.params.camera_height;
             let t = if level.surface < 2 { row.plane } else { height * row.inverse_tan };
-            plane.shade(band.scene, frame, [x, y], [t, row.inverse_tan], level.masks[number], &mut desk.point, out);
+            plane.shade(band.scene, frame, [x, y], t, row, level.masks[number], &mut desk.point, out);
         }
     }
     let places = width * number..width * (number + 1);

@@ -5,10 +5,11 @@
 
 use bytemuck::{Pod, Zeroable};
 
+use super::scene::Prism;
 use super::{Scene, View};
 use crate::error::{Error, Result};
 use crate::geometry::{Pose, Vector2, cross, sin_cos};
-use crate::panorama::Projection;
+use crate::panorama::{Projection, ProjectionKind};
 use crate::world::Footprint;
 
 /// Distance that stands for "never", m. Finite, because shaders may assume that no infinities occur.
@@ -50,11 +51,13 @@ pub(super) struct Body {
     pub first_edge: u32,
     /// Number of edges of a polygon.
     pub edge_count: u32,
+    /// Light that it gives off.
+    pub glow: f32,
     /// Fills up to 48 bytes.
-    pub padding: [u32; 3],
+    pub padding: [u32; 2],
 }
 
-/// A lamp. The layout is that of `Lamp` in `shaders/shade.wgsl`.
+/// A lamp, or a piece of a window. The layout is that of `Lamp` in `shaders/shade.wgsl`.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 pub(super) struct Lamp {
@@ -62,8 +65,14 @@ pub(super) struct Lamp {
     pub position: [f32; 2],
     /// Height above the floor, m.
     pub height: f32,
-    /// Irradiance that a facing surface gets at 1 m.
+    /// Irradiance that a facing surface gets at 1 m, straight in front of it.
     pub intensity: f32,
+    /// Unit normal of a window into the room; zero for a lamp, which shines to all sides.
+    pub normal: [f32; 2],
+    /// What a window's size adds to the square of the distance, m^2.
+    pub size_squared: f32,
+    /// Fills up to 32 bytes.
+    pub padding: u32,
 }
 
 /// One row of the picture. The layout is that of `Row` in `shaders/columns.wgsl`.
@@ -101,6 +110,14 @@ pub(super) struct Params {
     pub room_height: f32,
     /// Ambient light.
     pub ambient: f32,
+    /// 1 where rows are even in elevation, 0 where they are even in its tangent.
+    pub equal_angle: u32,
+    /// Pieces of windows; they follow the lamps.
+    pub pane_count: u32,
+    /// Share of ambient light that does not reach corners.
+    pub corner_shade: f32,
+    /// Inverse of how far that reaches, 1/m.
+    pub inverse_reach: f32,
 }
 
 /// All tables of one view. Kept by a renderer and refilled view by view without allocating.
@@ -113,7 +130,10 @@ pub(super) struct Frame {
     /// First the walls, then the edges of polygonal bodies.
     pub edges: Vec<Edge>,
     pub bodies: Vec<Body>,
+    /// Lamps, then pieces of windows.
     pub lamps: Vec<Lamp>,
+    /// How many are lamps.
+    lamp_count: usize,
     /// Unit vectors of the columns for a camera that faces along x, and the width that they are for.
     circle: Vec<Vector2<f64>>,
 }
@@ -133,6 +153,7 @@ impl Frame {
             edges: Vec::new(),
             bodies: Vec::new(),
             lamps: Vec::new(),
+            lamp_count: 0,
             circle: Vec::new(),
         }
     }
@@ -140,39 +161,96 @@ impl Frame {
     /// Fills the tables for `view`.
     ///
     /// # Errors
-    /// When the picture has no pixels, a number is not finite, or the view does not pose each body of the scene.
+    /// When the picture has no pixels, its rows reach beyond the zenith, a number is not finite, the view does not pose each body
+    /// of the scene, or the camera is inside one.
     pub fn prepare(&mut self, scene: &Scene, view: &View<'_>) -> Result<()> {
         check(scene, view)?;
         let projection = view.projection;
-        let camera = view.robot.position();
+        let camera = view.robot.transform(scene.camera_offset_m);
         self.fill_directions(&projection, view.robot.heading);
         self.fill_rows(&projection, scene);
         self.edges.clear();
         push_edges(&mut self.edges, scene.outline.iter().map(|&p| p - camera), -1.0);
         self.bodies.clear();
         for (prism, pose) in scene.bodies.iter().zip(view.bodies) {
-            self.push_body(&prism.footprint, prism.bottom_m, prism.top_m, pose, camera);
+            self.push_body(prism, scene.factors.lamps, pose, camera);
         }
-        self.lamps.clear();
-        self.lamps.extend(scene.lamps.iter().map(|l| {
-            let [x, y, z] = l.position_m;
-            let position = [(x - camera.x) as f32, (y - camera.y) as f32];
-            Lamp { position, height: z as f32, intensity: l.intensity as f32 }
-        }));
+        self.refuse_inside(scene, camera)?;
+        for pane in &scene.windows {
+            self.push_body(pane, scene.factors.windows, &Pose::IDENTITY, camera);
+        }
+        self.fill_lamps(scene, camera);
         self.params = Params {
             width: projection.width,
             height: projection.height,
             wall_count: scene.outline.len() as u32,
             body_count: self.bodies.len() as u32,
-            lamp_count: self.lamps.len() as u32,
+            lamp_count: self.lamp_count as u32,
             rows_per_invocation: projection.height,
             pixel_rad: projection.pixel_rad() as f32,
             camera_height: scene.camera_height_m as f32,
             camera: [camera.x as f32, camera.y as f32],
             room_height: scene.room_height_m as f32,
-            ambient: scene.ambient as f32,
+            ambient: (scene.factors.ambient * scene.light.ambient) as f32,
+            equal_angle: u32::from(projection.kind == ProjectionKind::EqualAngle),
+            pane_count: (self.lamps.len() - self.lamp_count) as u32,
+            corner_shade: scene.light.corner_shade as f32,
+            inverse_reach: (1.0 / scene.light.corner_reach_m) as f32,
         };
         Ok(())
+    }
+
+    /// What shines: lamps first, then pieces of windows. What is switched off is left out.
+    fn fill_lamps(&mut self, scene: &Scene, camera: Vector2<f64>) {
+        let from_camera = |[x, y, _]: [f64; 3]| [(x - camera.x) as f32, (y - camera.y) as f32];
+        let factors = &scene.factors;
+        self.lamps.clear();
+        if factors.lamps > 0.0 {
+            self.lamps.extend(scene.light.lamps.iter().map(|l| Lamp {
+                position: from_camera(l.position_m),
+                height: l.position_m[2] as f32,
+                intensity: (factors.lamps * l.intensity) as f32,
+                normal: [0.0; 2],
+                size_squared: 0.0,
+                padding: 0,
+            }));
+        }
+        self.lamp_count = self.lamps.len();
+        if factors.windows > 0.0 {
+            self.lamps.extend(scene.light.panes.iter().map(|p| Lamp {
+                position: from_camera(p.position_m),
+                height: p.position_m[2] as f32,
+                intensity: (factors.windows * p.brightness * p.area_m2) as f32,
+                normal: p.normal.map(|x| x as f32),
+                // Exact on the axis of a disc of that area.
+                size_squared: (p.area_m2 / std::f64::consts::PI) as f32,
+                padding: 0,
+            }));
+        }
+    }
+
+    /// Refuses a camera inside the solid of a body.
+    fn refuse_inside(&self, scene: &Scene, camera: Vector2<f64>) -> Result<()> {
+        let height = scene.camera_height_m as f32;
+        let holds = |body: &Body| {
+            let [x, y] = body.centre;
+            let edges = &self.edges[body.first_edge as usize..][..body.edge_count as usize];
+            let within = if body.radius > 0.0 {
+                x * x + y * y < body.radius * body.radius
+            } else {
+                edges.iter().all(|e| e.distance > 0.0)
+            };
+            within && body.bottom < height && height < body.top
+        };
+        match self.bodies.iter().position(holds) {
+            None => Ok(()),
+            Some(k) => Err(Error::CameraInside {
+                body: scene.bodies[k].name.clone(),
+                x_m: camera.x,
+                y_m: camera.y,
+                z_m: scene.camera_height_m,
+            }),
+        }
     }
 
     fn fill_directions(&mut self, projection: &Projection, heading: f64) {
@@ -206,11 +284,12 @@ impl Frame {
         }));
     }
 
-    fn push_body(&mut self, footprint: &Footprint, bottom: f64, top: f64, pose: &Pose, camera: Vector2<f64>) {
+    /// Appends a body; `light` is the factor on what it gives off.
+    fn push_body(&mut self, prism: &Prism, light: f64, pose: &Pose, camera: Vector2<f64>) {
         let (s, c) = sin_cos(pose.heading);
         let centre = pose.position() - camera;
         let first_edge = self.edges.len() as u32;
-        let radius = match footprint {
+        let radius = match &prism.footprint {
             Footprint::Disc(radius) => *radius,
             Footprint::Polygon(corners) => {
                 let place = |p: &Vector2<f64>| centre + Vector2::new(c * p.x - s * p.y, s * p.x + c * p.y);
@@ -221,12 +300,13 @@ impl Frame {
         self.bodies.push(Body {
             centre: [centre.x as f32, centre.y as f32],
             heading: [c as f32, s as f32],
-            bottom: bottom as f32,
-            top: top as f32,
+            bottom: prism.bottom_m as f32,
+            top: prism.top_m as f32,
             radius: radius as f32,
             first_edge,
             edge_count: self.edges.len() as u32 - first_edge,
-            padding: [0; 3],
+            glow: (light * prism.glow) as f32,
+            padding: [0; 2],
         });
     }
 }
@@ -260,6 +340,11 @@ fn check(scene: &Scene, view: &View<'_>) -> Result<()> {
     if !(p.horizon_row.is_finite() && p.mount_rad.is_finite()) {
         return invalid("projection", format!("{p:?}"), "finite numbers".to_owned());
     }
+    let steepest = p.horizon_row.max(f64::from(p.height) - p.horizon_row) * p.pixel_rad();
+    if p.kind == ProjectionKind::EqualAngle && steepest > std::f64::consts::FRAC_PI_2 + 1e-9 {
+        let found = format!("rows up to {:.1} degrees from the horizon", steepest.to_degrees());
+        return invalid("equal-angle panorama", found, "up to 90 degrees".to_owned());
+    }
     if !view.robot.is_finite() {
         return invalid("robot pose", format!("{:?}", view.robot), "finite numbers".to_owned());
     }
@@ -267,8 +352,8 @@ fn check(scene: &Scene, view: &View<'_>) -> Result<()> {
         let allowed = format!("{}, one for each body", scene.bodies.len());
         return invalid("number of body poses", view.bodies.len().to_string(), allowed);
     }
-    if let Some(pose) = view.bodies.iter().find(|b| !b.is_finite()) {
-        return invalid("body pose", format!("{pose:?}"), "finite numbers".to_owned());
+    if let Some((pose, prism)) = view.bodies.iter().zip(&scene.bodies).find(|(b, _)| !b.is_finite()) {
+        return invalid(&format!("pose of body `{}`", prism.name), format!("{pose:?}"), "finite numbers".to_owned());
     }
     Ok(())
 }

@@ -6,17 +6,19 @@
 //! The way of a picture: [`Scene::new`] packs a world once and bakes its textures (`scene`, `texture`). For each [`View`] the
 //! geometry is moved to the camera and tables of directions and rows are filled (`frame`). Each column then finds the walls
 //! and bodies in its upright plane (`columns`), its rows pick what they see of them, and each face gets its texture (`sample`)
-//! and light (`shade`).
+//! and light (`shade`). What a real [`Camera`] makes of it comes last (`camera`).
 //!
 //! What is exact and what is not:
 //! - Walls, upright prisms over discs and convex polygons, their tops and undersides, floor and ceiling are met exactly, also
 //!   where bodies stand on one another, hang, or overlap. Behind fifteen bodies in a row a column sees no further body.
-//! - A ray that meets nothing, which takes a camera outside the room, is black with range 0 and instance 0. A body whose solid
-//!   holds the camera is not drawn.
+//! - A ray that meets nothing, which takes a camera outside the room, is black with range 0 and instance 0. A camera inside the
+//!   solid of a body is an error.
 //! - Textures are prefiltered, alike along both axes. Light is ambient and Lambert's, without shadows.
+//! - A camera's blur, noise and dirt change colours alone: range and instance ids stay exact.
 //! - The CPU renderer's pictures are the same bytes on every machine and any number of threads.
 
 mod batch;
+mod camera;
 mod columns;
 mod cpu;
 mod frame;
@@ -33,6 +35,7 @@ use crate::error::{Error, Result};
 use crate::geometry::Pose;
 use crate::panorama::{Panorama, Projection};
 
+pub use camera::Camera;
 pub use cpu::CpuRenderer;
 pub use gpu::{GpuRenderer, SHADER};
 pub use scene::Scene;
@@ -64,7 +67,7 @@ pub struct RendererInfo {
 pub struct View<'a> {
     /// Size and projection.
     pub projection: Projection,
-    /// Pose of the robot in the room; the camera stands at the world's camera height above it.
+    /// Pose of the robot in the room; the camera is where the world mounts it on the robot.
     pub robot: Pose,
     /// Current pose of every body, in the order of `World::bodies`.
     pub bodies: &'a [Pose],
@@ -75,7 +78,8 @@ pub trait Renderer: Send {
     /// Renders one view into `out`, whose buffers are resized as needed and otherwise reused.
     ///
     /// # Errors
-    /// When the graphics device fails, or the size is more than it allows.
+    /// When a number of the view is not finite, the camera is inside a body ([`Error::CameraInside`]), the graphics device
+    /// fails, or the size is more than it allows.
     fn render(&mut self, scene: &Scene, view: &View<'_>, out: &mut Panorama) -> Result<()>;
 
     /// Renders several views at once, each into the place of `out` with its number: on the CPU a thread takes a picture, on a GPU

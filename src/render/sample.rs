@@ -14,7 +14,7 @@ use super::texels::Texels;
 pub(super) const LANES: usize = 16;
 /// Most rows of a column that are sampled at once.
 pub(super) const RUN: usize = 240;
-/// Most texels along v that a run of rows covers on a level, a power of two: little more than two a row, for [`level`] sees to
+/// Most texels along v that a run of rows covers on a level, a power of two: little more than two a row, for [`strip_footprint`] sees to
 /// that.
 const REACH: usize = 1024;
 /// Adding this rounds a number of magnitude below 2^22 to a whole one, which then stands in the low bits.
@@ -26,24 +26,42 @@ pub(super) fn round(x: f32) -> i32 {
     ((x + ROUNDER).to_bits() as i32).wrapping_sub(ROUNDER.to_bits() as i32)
 }
 
-/// Level of detail, in 1/256 of a level, for a pixel that covers `a_m` by `b_m` of the surface.
+/// What a pixel covers of an upright surface, in texels along the axis that counts: `u_m` by `v_m`.
 ///
 /// The texture is filtered the same along both axes. Taking the long side would blur surfaces that are seen at a flat angle,
-/// the short side would let them flicker; half the long side is the compromise. The logarithm is read off the bits of the
+/// the short side would let them flicker; half the long side is the compromise.
+#[inline(always)]
+pub(super) fn footprint(material: &Material, [u_m, v_m]: [f32; 2]) -> f32 {
+    let (u, v) = (u_m * material.texels_per_m[0], v_m * material.texels_per_m[1]);
+    (0.5 * u.max(v)).max(u.min(v))
+}
+
+/// The same where u is seen at a slant and v is not, and [`REACH`] asks that v is never undersampled.
+#[inline(always)]
+pub(super) fn strip_footprint(material: &Material, [u_m, v_m]: [f32; 2]) -> f32 {
+    (0.5 * (u_m * material.texels_per_m[0])).max(v_m * material.texels_per_m[1])
+}
+
+/// Level of detail, in 1/256 of a level, for a pixel that covers so many texels. The logarithm is read off the bits of the
 /// number, linear between powers of two: the same on all machines. It is rounded to quarters.
 #[inline(always)]
-pub(super) fn level(material: &Material, a_m: f32, b_m: f32) -> i32 {
-    let footprint = (0.5 * a_m.max(b_m)).max(a_m.min(b_m)) * material.texels_per_m;
+pub(super) fn level(material: &Material, footprint: f32) -> i32 {
     let logarithm = (footprint.to_bits() as i32 - 1.0_f32.to_bits() as i32) >> 15;
     (logarithm.clamp(0, 256 * material.log2_size as i32) + 32) & !63
 }
 
-/// A length on a surface in texels, less whole periods.
+/// A length on a surface in texels, less whole periods, along u (`axis` 0) or v (1).
 #[inline(always)]
-pub(super) fn within_tile(length_m: f32, material: &Material) -> f32 {
+pub(super) fn within_tile(length_m: f32, material: &Material, axis: usize) -> f32 {
     let size = (1_u32 << material.log2_size) as f32;
-    let texels = length_m * material.texels_per_m;
+    let texels = length_m * material.texels_per_m[axis];
     texels - size * libm::floorf(texels / size)
+}
+
+/// The same as a coordinate.
+#[inline(always)]
+pub(super) fn coordinate(length_m: f32, material: &Material, axis: usize) -> i32 {
+    (within_tile(length_m, material, axis) * 65536.0) as i32
 }
 
 /// Index in the atlas of the first texel of a level.
@@ -202,13 +220,13 @@ pub(super) struct Strip<'a> {
 }
 
 impl<'a> Strip<'a> {
-    /// `u_m`, and `v_m` at row 0 of the picture; v falls by `step_m` a row. `level` comes from [`level`] with `step_m` as the
-    /// shorter of the two lengths. `row` is the first that is asked for.
+    /// `u_m`, and `v_m` at row 0 of the picture; v falls by `step_m` a row. `level` comes from [`strip_footprint`] with `step_m`
+    /// along v. `row` is the first that is asked for.
     #[inline(always)]
     pub fn new(atlas: &'a [u32], material: &'a Material, [u_m, v_m, step_m]: [f32; 3], level: i32, row: usize) -> Self {
-        let step = (step_m * material.texels_per_m * -65536.0) as i32;
-        let v = ((within_tile(v_m, material) * 65536.0) as i32).wrapping_add(step.wrapping_mul(row as i32));
-        Self { atlas, material, u: (within_tile(u_m, material) * 65536.0) as i32, v, step, level }
+        let step = (step_m * material.texels_per_m[1] * -65536.0) as i32;
+        let v = coordinate(v_m, material, 1).wrapping_add(step.wrapping_mul(row as i32));
+        Self { atlas, material, u: coordinate(u_m, material, 0), v, step, level }
     }
 
     /// Coordinate of a row on a level.
@@ -425,6 +443,32 @@ impl Taps {
 #[inline(always)]
 fn towards(fine: u16, coarse: u16, quarters: u16) -> u16 {
     fine.wrapping_add((coarse >> 2).wrapping_sub(fine >> 2).wrapping_mul(quarters))
+}
+
+/// Colour of a single point times light: for surfaces whose level of detail changes from pixel to pixel.
+#[inline(always)]
+pub(super) fn shade_point(atlas: &[u32], material: &Material, [u, v]: [i32; 2], level: i32, light: f32) -> u32 {
+    let (finer, quarters) = ((level >> 8) as u32, (level >> 6 & 3) as u16);
+    let fine = sample_point(atlas, material, u, v, finer);
+    let coarse = if quarters == 0 { fine } else { sample_point(atlas, material, u, v, finer + 1) };
+    let factor = factors(&[light; LANES])[0] as u16;
+    let channel = |k: usize| u32::from(light_up(towards(fine[k], coarse[k], quarters), factor)) << (8 * k);
+    channel(0) | channel(1) | channel(2) | 0xff00_0000
+}
+
+/// Red, green and blue of one level at a point, in 1/256.
+#[inline(always)]
+fn sample_point(atlas: &[u32], material: &Material, u: i32, v: i32, level: u32) -> [u16; 3] {
+    let log2_size = material.log2_size - level;
+    let mask = (1_i32 << log2_size) - 1;
+    let texels = &atlas[level_base(material, level)..][..1 << (2 * log2_size)];
+    let (x, y) = (on_level(u, level), on_level(v, level));
+    let texel = |x: i32, y: i32| texels[(((x & mask) << log2_size) + (y & mask)) as usize];
+    let line = |y: i32| [texel(x >> 8, y), texel((x >> 8) + 1, y)];
+    let (low, high) = (line(y >> 8), line((y >> 8) + 1));
+    let channel = |texel: u32, k: usize| (texel >> (8 * k) & 255) as u16;
+    let along = |t: [u32; 2], k: usize| (weigh(channel(t[0], k), channel(t[1], k), (x & 255) as u16) + 128) >> 8;
+    std::array::from_fn(|k| weigh(along(low, k), along(high, k), (y & 255) as u16))
 }
 
 /// Texels at some places and those after them.

@@ -1,5 +1,6 @@
 //! A world packed for rendering: the same for both renderers, and the same for every view.
 
+use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use bytemuck::{Pod, Zeroable};
@@ -9,8 +10,8 @@ use super::texture;
 use crate::error::Result;
 use crate::geometry::Vector2;
 use crate::panorama::INSTANCE_FIRST_WALL;
-use crate::world::spec::LampSpec;
-use crate::world::{Footprint, TextureSpec, World};
+use crate::world::spec::{LampSpec, LightFactors};
+use crate::world::{Body, Footprint, LightPreset, Pattern, Texture, Window, World};
 
 /// Where a surface's texture lies in the atlas. The layout is that of `Material` in `shaders/shade.wgsl`.
 #[repr(C)]
@@ -20,22 +21,54 @@ pub(super) struct Material {
     pub base: u32,
     /// Binary logarithm of the finest level's edge length in texels. The coarser levels follow, down to one texel.
     pub log2_size: u32,
-    /// Texels of the finest level per metre of surface.
-    pub texels_per_m: f32,
-    /// Fills up to 16 bytes.
-    pub padding: u32,
+    /// Texels of the finest level per metre of surface, along u and v. They differ for images that are not square.
+    pub texels_per_m: [f32; 2],
 }
 
 /// A body as far as its pose does not matter.
 #[derive(Debug, Clone)]
 pub(super) struct Prism {
+    /// Name, for messages.
+    pub name: String,
     /// Footprint in the body's own frame.
     pub footprint: Footprint,
     /// Height of the underside, m.
     pub bottom_m: f64,
     /// Height of the top, m.
     pub top_m: f64,
+    /// Light that it gives off.
+    pub glow: f64,
 }
+
+/// A piece of a window, small enough to shine from its middle.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Pane {
+    /// Middle: x, y, z, m.
+    pub position_m: [f64; 3],
+    /// Unit normal into the room.
+    pub normal: [f64; 2],
+    /// Area, m^2.
+    pub area_m2: f64,
+    /// Irradiance that a square metre makes on a facing surface 1 m away.
+    pub brightness: f64,
+}
+
+/// What shines in a room.
+#[derive(Debug, Clone)]
+pub(super) struct SceneLight {
+    pub ambient: f64,
+    pub lamps: Vec<LampSpec>,
+    pub panes: Vec<Pane>,
+    /// Share of ambient light that does not reach corners.
+    pub corner_shade: f64,
+    /// How far from a corner that begins, m.
+    pub corner_reach_m: f64,
+}
+
+/// Largest edge of a piece of a window, m.
+const PIECE_M: f64 = 0.8;
+/// Most pieces along an edge of a window.
+const MOST_PIECES: f64 = 4.0;
 
 /// A world packed for rendering: geometry, materials and textures, the same for both renderers.
 ///
@@ -45,21 +78,27 @@ pub(super) struct Prism {
 /// Textures are laid out in metres. On a wall u runs from its first corner to its second and v up from the floor, so that a
 /// wall longer than its texture's period shows the pattern again after each period. On a body u runs anti-clockwise around
 /// the footprint, from the first corner or from the body's own x axis, and v up from the underside. Floor and ceiling take the
-/// room's x and y, tops and undersides of bodies the body's own.
-#[derive(Debug)]
+/// room's x and y, tops and undersides of bodies the body's own. Windows are thin prisms on their walls and come last.
+#[derive(Debug, Clone)]
 pub struct Scene {
-    /// Tells scenes apart, so that a renderer knows which one it holds on its device.
+    /// Tells textures of scenes apart, so that a renderer knows which ones it holds on its device.
     pub(super) id: u64,
     pub(super) outline: Vec<Vector2<f64>>,
     pub(super) bodies: Vec<Prism>,
+    /// Panes of windows, around the room's origin.
+    pub(super) windows: Vec<Prism>,
     pub(super) room_height_m: f64,
     pub(super) camera_height_m: f64,
-    pub(super) ambient: f64,
-    pub(super) lamps: Vec<LampSpec>,
+    /// Position of the camera on the robot, m.
+    pub(super) camera_offset_m: Vector2<f64>,
+    /// What could shine, ...
+    pub(super) light: Arc<SceneLight>,
+    /// ... and how much of it does, exposure included.
+    pub(super) factors: LightFactors,
     /// One material per surface.
-    pub(super) materials: Vec<Material>,
+    pub(super) materials: Arc<Vec<Material>>,
     /// Texels, red in the lowest byte; see [`texture`] for the layout of a texture within.
-    pub(super) atlas: Vec<u32>,
+    pub(super) atlas: Arc<Vec<u32>>,
 }
 
 impl Scene {
@@ -77,27 +116,60 @@ impl Scene {
                 .all(|(k, b)| { usize::from(b.instance) == usize::from(INSTANCE_FIRST_WALL) + world.outline.len() + k }),
             "instance ids follow the order of surfaces"
         );
-        let textures: Vec<&TextureSpec> = [&world.floor_texture, &world.ceiling_texture]
+        // Seen from the room, u runs from right to left along a wall, and along x over a ceiling.
+        let mirrored = [(&world.floor_texture, false), (&world.ceiling_texture, true)];
+        let surfaces: Vec<Surface<'_>> = mirrored
             .into_iter()
-            .chain(&world.wall_textures)
-            .chain(world.bodies.iter().map(|b| &b.texture))
+            .chain(world.wall_textures.iter().map(|t| (t, true)))
+            .chain(world.bodies.iter().map(|b| (&b.texture, false)))
+            .chain(world.windows.iter().map(|w| (&w.texture, false)))
+            .map(|(texture, mirrored)| Surface::new(texture, mirrored))
             .collect();
-        let (materials, atlas) = pack(&textures);
-        Ok(Self {
+        let (materials, atlas) = pack(&surfaces);
+        let body = |b: &Body| Prism {
+            name: b.name.clone(),
+            footprint: b.footprint.clone(),
+            bottom_m: b.bottom_m,
+            top_m: b.top_m,
+            glow: b.glow,
+        };
+        let window = |w: &Window| Prism {
+            name: w.name.clone(),
+            footprint: Footprint::Polygon(w.footprint.clone()),
+            bottom_m: w.bottom_m,
+            top_m: w.top_m,
+            glow: std::f64::consts::PI * w.brightness,
+        };
+        let [forward, left] = world.spec.camera.offset_m;
+        let light = &world.spec.light;
+        let scene = Self {
             id: NEXT_ID.fetch_add(1, Ordering::Relaxed),
             outline: world.outline.clone(),
-            bodies: world
-                .bodies
-                .iter()
-                .map(|b| Prism { footprint: b.footprint.clone(), bottom_m: b.bottom_m, top_m: b.top_m })
-                .collect(),
+            bodies: world.bodies.iter().map(body).collect(),
+            windows: world.windows.iter().map(window).collect(),
             room_height_m: world.spec.room.height_m,
             camera_height_m: world.spec.camera.height_m,
-            ambient: world.spec.light.ambient,
-            lamps: world.spec.light.lamps.clone(),
-            materials,
-            atlas,
-        })
+            camera_offset_m: Vector2::new(forward, left),
+            light: Arc::new(SceneLight {
+                ambient: light.ambient,
+                lamps: light.lamps.clone(),
+                panes: world.windows.iter().flat_map(panes).collect(),
+                corner_shade: light.corner_shade,
+                corner_reach_m: light.corner_reach_m,
+            }),
+            factors: LightPreset::Day.factors(),
+            materials: Arc::new(materials),
+            atlas: Arc::new(atlas),
+        };
+        Ok(scene.under(light.preset, world.spec.camera.optics.exposure))
+    }
+
+    /// The same scene under other light and exposure. Textures are shared, with a graphics device's copy too.
+    #[must_use]
+    pub fn under(&self, light: LightPreset, exposure: f64) -> Self {
+        let f = light.factors();
+        let factors = LightFactors { ambient: exposure * f.ambient, lamps: exposure * f.lamps, windows: exposure * f.windows };
+        Self { factors, ..self.clone() }
     }
 
     /// Number of bodies: how many poses a [`super::View`] has to give.
@@ -107,32 +179,70 @@ impl Scene {
     }
 }
 
+/// Cuts a window into pieces that are small beside the distances in a room.
+fn panes(window: &Window) -> impl Iterator<Item = Pane> {
+    let corner = |k: usize| window.footprint.get(k).copied().unwrap_or_default();
+    let (first, along, high) = (corner(0), corner(1) - corner(0), window.top_m - window.bottom_m);
+    let width = (along.x * along.x + along.y * along.y).sqrt().max(1e-9);
+    let normal = [-along.y / width, along.x / width].map(|x| -x);
+    let pieces = |length: f64| libm::ceil(length / PIECE_M).clamp(1.0, MOST_PIECES);
+    let (columns, rows) = (pieces(width), pieces(high));
+    let (bottom, brightness) = (window.bottom_m, window.brightness);
+    (0..(columns * rows) as usize).map(move |k| {
+        let (column, row) = (k / rows as usize, k % rows as usize);
+        let at = first + along * ((column as f64 + 0.5) / columns);
+        Pane {
+            position_m: [at.x, at.y, bottom + high * (row as f64 + 0.5) / rows],
+            normal,
+            area_m2: width * high / (columns * rows),
+            brightness,
+        }
+    })
+}
+
+/// A texture as a surface shows it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Surface<'a> {
+    pub texture: &'a Texture,
+    /// Whether u runs from right to left for who looks at it.
+    pub mirrored: bool,
+}
+
+impl<'a> Surface<'a> {
+    pub fn new(texture: &'a Texture, mirrored: bool) -> Self {
+        // Patterns have no right way round: they are shared.
+        Self { texture, mirrored: mirrored && matches!(texture.pattern, Pattern::Image(_)) }
+    }
+}
+
 /// Texels after the last texture, for vectors that read beyond a line that they need a part of.
 const PADDING: usize = 16;
 
 /// Bakes every texture once, also where several surfaces share it.
-fn pack(textures: &[&TextureSpec]) -> (Vec<Material>, Vec<u32>) {
-    let mut distinct: Vec<&TextureSpec> = Vec::new();
-    let which: Vec<usize> = textures
+fn pack(surfaces: &[Surface<'_>]) -> (Vec<Material>, Vec<u32>) {
+    let mut distinct: Vec<Surface<'_>> = Vec::new();
+    let which: Vec<usize> = surfaces
         .iter()
-        .map(|&t| {
-            distinct.iter().position(|&d| d == t).unwrap_or_else(|| {
-                distinct.push(t);
+        .map(|&s| {
+            distinct.iter().position(|&d| d == s).unwrap_or_else(|| {
+                distinct.push(s);
                 distinct.len() - 1
             })
         })
         .collect();
-    let sizes = texture::log2_sizes(&distinct);
-    let baked: Vec<texture::Baked> = distinct.par_iter().zip(sizes).map(|(t, n)| texture::bake(t, n)).collect();
+    let sizes = texture::log2_sizes(distinct.iter().map(|s| s.texture));
+    let baked: Vec<texture::Baked> = distinct.par_iter().zip(sizes).map(|(s, n)| texture::bake(s, n)).collect();
     let mut atlas = Vec::with_capacity(baked.iter().map(|b| b.texels.len()).sum::<usize>() + PADDING);
     let packed: Vec<Material> = baked
         .iter()
         .zip(&distinct)
-        .map(|(b, t)| {
+        .map(|(b, s)| {
             let base = atlas.len() as u32;
             atlas.extend_from_slice(&b.texels);
-            let texels_per_m = (f64::from(1_u32 << b.log2_size) / t.period_m) as f32;
-            Material { base, log2_size: b.log2_size, texels_per_m, padding: 0 }
+            let size = f64::from(1_u32 << b.log2_size);
+            let scale = |axis: usize| (size / (s.texture.period_m[axis] * f64::from(b.periods[axis]))) as f32;
+            let texels_per_m = [scale(0), scale(1)];
+            Material { base, log2_size: b.log2_size, texels_per_m }
         })
         .collect();
     atlas.resize(atlas.len() + PADDING, 0);

@@ -1,18 +1,26 @@
 //! Colour of a surface where rays meet it: texture times light. The twin of `shaders/shade.wgsl`.
 //!
-//! Light is Lambert's: each lamp's inverse-square irradiance times the cosine of incidence, and the ambient light. There are no
-//! shadows and no reflections.
+//! Light is Lambert's: each lamp's inverse-square irradiance times the cosine of incidence; windows shine by the cosine law
+//! themselves, piece by piece. Ambient light reaches corners less where a world asks for that. There are no shadows and no
+//! reflections.
 
 use super::Scene;
 use super::columns::Hit;
-use super::frame::{Frame, Lamp};
-use super::sample::{LANES, POINTS, PointRoom, Points, RUN, Strip, StripRoom, is_wanted, level, round, within_tile};
+use super::frame::{Edge, Frame, Lamp, Row};
+use super::sample::{
+    LANES, POINTS, PointRoom, Points, RUN, Strip, StripRoom, coordinate, footprint, is_wanted, level, round, shade_point,
+    strip_footprint, within_tile,
+};
 use super::scene::Material;
 
 /// Least distance from a lamp that counts, squared, m^2: a lamp is no point.
 const LAMP_SIZE_SQUARED: f32 = 0.01;
 /// Least cosine of incidence that counts in the width of a pixel's footprint.
 const LEAST_COSINE: f32 = 0.05;
+/// Least squared distance from a piece of a window that counts, m^2.
+const LEAST_SQUARE: f32 = 1.0e-4;
+/// What is less than this, m, behind a wall's line stands in the corner with it, and not beyond a corner that juts out.
+const BEHIND: f32 = 1.0e-6;
 
 /// Irradiance from `lamp` at height `z`, at a horizontal distance from the lamp of which the square is given, on a surface that
 /// faces the lamp with `facing`, the product of its normal with the vector to the lamp.
@@ -22,6 +30,37 @@ fn lit(lamp: &Lamp, offset_squared: f32, z: f32, facing: f32) -> f32 {
     let square = offset_squared + up * up;
     let square = if square > LAMP_SIZE_SQUARED { square } else { LAMP_SIZE_SQUARED };
     lamp.intensity * facing / (square * square.sqrt())
+}
+
+/// Light from a piece of a window that faces the point with `facing` and that the point faces, both as products of a normal
+/// with the vector between; the product of the two and the intensity is `weight`.
+#[inline(always)]
+fn lit_by_window(pane: &Lamp, weight: f32, offset_squared: f32, z: f32) -> f32 {
+    let up = pane.height - z;
+    let square = offset_squared + up * up;
+    let square = if square > LEAST_SQUARE { square } else { LEAST_SQUARE };
+    weight / (square * (square + pane.size_squared))
+}
+
+/// How deep in a corner something is that lies `distance` from a surface, 0 to 1.
+#[inline(always)]
+fn depth(frame: &Frame, distance: f32) -> f32 {
+    let depth = 1.0 - distance * frame.params.inverse_reach;
+    let depth = if depth > 0.0 { depth } else { 0.0 };
+    depth * depth
+}
+
+/// How deep a point is in the corner between its surface, with this normal (zero for a horizontal one), and a wall.
+#[inline(always)]
+fn depth_at_wall(frame: &Frame, edge: &Edge, [x, y]: [f32; 2], normal: [f32; 2]) -> f32 {
+    let before = edge.normal[0] * x + edge.normal[1] * y - edge.distance;
+    let along = edge.tangent[0] * x + edge.tangent[1] * y - edge.along;
+    let past = (-along).max(along - edge.length).max(0.0);
+    // A wall makes no corner with itself or one in its line, and a full one with one at a right angle.
+    let turned = 1.0 - (normal[0] * edge.normal[0] + normal[1] * edge.normal[1]);
+    let turned = if turned < 1.0 { turned } else { 1.0 };
+    let depth = turned * depth(frame, (before * before + past * past).sqrt());
+    if before > -BEHIND { depth } else { 0.0 }
 }
 
 /// Where the sides of a column are shaded.
@@ -55,24 +94,73 @@ pub(super) fn shade_side(
     // What the rows have in common: u, the step of v, the level of detail, and where the lamps stand.
     let cosine = -(hit.normal[0] * direction[0] + hit.normal[1] * direction[1]);
     let across = hit.near * frame.params.pixel_rad;
-    let level = level(material, across / cosine.max(LEAST_COSINE), across);
+    let slant = across / cosine.max(LEAST_COSINE);
     let foot = hit.bottom.max(0.0);
-    let v = eye + hit.near * frame.rows[0].tan - foot;
+    let rows = &frame.rows[first_row..first_row + count];
     let light = &mut room.light[..count];
     light.fill(frame.params.ambient);
-    for lamp in &frame.lamps {
-        let to = [lamp.position[0] - hit.near * direction[0], lamp.position[1] - hit.near * direction[1]];
+    let at = hit.near;
+    let point = [at * direction[0], at * direction[1]];
+    if frame.params.corner_shade > 0.0 {
+        let walls = &frame.edges[..frame.params.wall_count as usize];
+        let nook = walls.iter().fold(0.0, |deepest: f32, e| deepest.max(depth_at_wall(frame, e, point, hit.normal)));
+        let reaches = |depth: f32| 1.0 - frame.params.corner_shade * depth;
+        for (light, row) in light.iter_mut().zip(rows) {
+            let z = eye + at * row.tan;
+            let edge = depth(frame, z).max(depth(frame, frame.params.room_height - z));
+            *light *= reaches(nook) * reaches(edge);
+        }
+    }
+    let glow = glow(frame, hit.surface);
+    if glow > 0.0 {
+        for light in light.iter_mut() {
+            *light += glow;
+        }
+    }
+    let (lamps, panes) = frame.lamps.split_at(frame.params.lamp_count as usize);
+    for lamp in lamps {
+        let to = [lamp.position[0] - point[0], lamp.position[1] - point[1]];
         let facing = hit.normal[0] * to[0] + hit.normal[1] * to[1];
         if facing > 0.0 {
             let offset_squared = to[0] * to[0] + to[1] * to[1];
-            for (light, row) in light.iter_mut().zip(&frame.rows[first_row..first_row + count]) {
-                *light += lit(lamp, offset_squared, eye + hit.near * row.tan, facing);
+            for (light, row) in light.iter_mut().zip(rows) {
+                *light += lit(lamp, offset_squared, eye + at * row.tan, facing);
             }
         }
     }
-    let strip = Strip::new(&scene.atlas, material, [hit.u, v, across], level, first_row);
-    let blocks = count.div_ceil(LANES);
-    strip.shade(&room.light.as_chunks().0[..blocks], &mut room.strip, &mut out.as_chunks_mut().0[..blocks]);
+    for pane in panes {
+        let to = [pane.position[0] - point[0], pane.position[1] - point[1]];
+        let facing = hit.normal[0] * to[0] + hit.normal[1] * to[1];
+        let faced = -(pane.normal[0] * to[0] + pane.normal[1] * to[1]);
+        if facing > 0.0 && faced > 0.0 {
+            let (weight, offset_squared) = (pane.intensity * facing * faced, to[0] * to[0] + to[1] * to[1]);
+            for (light, row) in light.iter_mut().zip(rows) {
+                *light += lit_by_window(pane, weight, offset_squared, eye + at * row.tan);
+            }
+        }
+    }
+    if frame.params.equal_angle == 0 {
+        let level = level(material, strip_footprint(material, [slant, across]));
+        let v = eye + hit.near * frame.rows[0].tan - foot;
+        let strip = Strip::new(&scene.atlas, material, [hit.u, v, across], level, first_row);
+        let blocks = count.div_ceil(LANES);
+        strip.shade(&room.light.as_chunks().0[..blocks], &mut room.strip, &mut out.as_chunks_mut().0[..blocks]);
+    } else {
+        // Steps and level of detail change from row to row.
+        let u = coordinate(hit.u, material, 0);
+        for ((colour, row), light) in out.iter_mut().zip(rows).zip(&*light) {
+            let high = across * row.stretch * row.stretch;
+            let level = level(material, footprint(material, [slant, high]));
+            let v = coordinate(eye + hit.near * row.tan - foot, material, 1);
+            *colour = shade_point(&scene.atlas, material, [u, v], level, *light);
+        }
+    }
+}
+
+/// Light that a surface gives off.
+#[inline(always)]
+fn glow(frame: &Frame, surface: u32) -> f32 {
+    surface.checked_sub(2 + frame.params.wall_count).map_or(0.0, |k| frame.bodies[k as usize].glow)
 }
 
 /// A horizontal surface: floor, ceiling, or the top or underside of a body.
@@ -87,6 +175,8 @@ pub(super) struct Plane {
     z: f32,
     /// 1 where it faces up, -1 where it faces down.
     up: f32,
+    /// Light that it gives off.
+    glow: f32,
 }
 
 impl Plane {
@@ -104,8 +194,8 @@ impl Plane {
             heading = body.heading;
             z = if underside { body.bottom } else { body.top };
         }
-        let camera = camera.map(|x| within_tile(x, &material));
-        Self { material, heading, camera, z, up: if underside { -1.0 } else { 1.0 } }
+        let camera = [within_tile(camera[0], &material, 0), within_tile(camera[1], &material, 1)];
+        Self { material, heading, camera, z, up: if underside { -1.0 } else { 1.0 }, glow: glow(frame, surface) }
     }
 
     /// Height of the surface, m.
@@ -120,19 +210,24 @@ impl Plane {
         scene: &Scene,
         frame: &Frame,
         [x, y]: [&[f32; POINTS]; 2],
-        [t, inverse_tan]: [f32; 2],
+        t: f32,
+        row: &Row,
         wanted: u64,
         room: &mut PointRoom,
         out: &mut [u32; POINTS],
     ) {
         let [cos, sin] = self.heading;
         let across = t * frame.params.pixel_rad;
-        let level = level(&self.material, across * inverse_tan.abs(), across);
-        let texels = t * self.material.texels_per_m;
+        // Rows that are even in elevation are farther apart in its tangent.
+        let spread = if frame.params.equal_angle == 0 { 1.0 } else { row.stretch * row.stretch };
+        let deep = across * row.inverse_tan.abs() * spread;
+        let finest = self.material.texels_per_m[0].max(self.material.texels_per_m[1]);
+        let level = level(&self.material, (0.5 * deep.max(across)).max(deep.min(across)) * finest);
+        let texels = self.material.texels_per_m.map(|scale| t * scale);
         let (mut u, mut v) = ([0; POINTS], [0; POINTS]);
         for k in 0..POINTS {
-            u[k] = round((texels * (cos * x[k] + sin * y[k]) + self.camera[0]) * 256.0) << 8;
-            v[k] = round((texels * (cos * y[k] - sin * x[k]) + self.camera[1]) * 256.0) << 8;
+            u[k] = round((texels[0] * (cos * x[k] + sin * y[k]) + self.camera[0]) * 256.0) << 8;
+            v[k] = round((texels[1] * (cos * y[k] - sin * x[k]) + self.camera[1]) * 256.0) << 8;
         }
         let points = Points { atlas: &scene.atlas, material: &self.material, u: &u, v: &v, level };
         points.look_up(wanted, room);
@@ -158,12 +253,40 @@ impl Plane {
     #[inline(always)]
     fn light(&self, frame: &Frame, x: &[f32; LANES], y: &[f32; LANES], t: f32) -> [f32; LANES] {
         let mut light = [frame.params.ambient; LANES];
-        for lamp in &frame.lamps {
+        if frame.params.corner_shade > 0.0 {
+            let mut nook = [0.0_f32; LANES];
+            for edge in &frame.edges[..frame.params.wall_count as usize] {
+                for k in 0..LANES {
+                    nook[k] = nook[k].max(depth_at_wall(frame, edge, [t * x[k], t * y[k]], [0.0; 2]));
+                }
+            }
+            for (light, nook) in light.iter_mut().zip(nook) {
+                *light *= 1.0 - frame.params.corner_shade * nook;
+            }
+        }
+        if self.glow > 0.0 {
+            for light in &mut light {
+                *light += self.glow;
+            }
+        }
+        let (lamps, panes) = frame.lamps.split_at(frame.params.lamp_count as usize);
+        for lamp in lamps {
             let facing = self.up * (lamp.height - self.z);
             if facing > 0.0 {
                 for k in 0..LANES {
                     let to = [lamp.position[0] - t * x[k], lamp.position[1] - t * y[k]];
                     light[k] += lit(lamp, to[0] * to[0] + to[1] * to[1], self.z, facing);
+                }
+            }
+        }
+        for pane in panes {
+            let facing = self.up * (pane.height - self.z);
+            if facing > 0.0 {
+                for k in 0..LANES {
+                    let to = [pane.position[0] - t * x[k], pane.position[1] - t * y[k]];
+                    let faced = -(pane.normal[0] * to[0] + pane.normal[1] * to[1]);
+                    let weight = pane.intensity * facing * if faced > 0.0 { faced } else { 0.0 };
+                    light[k] += lit_by_window(pane, weight, to[0] * to[0] + to[1] * to[1], self.z);
                 }
             }
         }

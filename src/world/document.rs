@@ -116,16 +116,24 @@ impl Node {
         }
     }
 
-    /// Adds to the table at `key`, if there is one, the entries of `defaults` that it does not have.
-    pub(super) fn fill(&mut self, key: &str, defaults: Self) {
-        let (Value::Table(entries), Value::Table(defaults)) = (&mut self.value, defaults.value) else { return };
-        let entry = entries.iter_mut().find(|(k, _)| k == key).map(|(_, node)| &mut node.value);
-        if let Some(Value::Table(entries)) = entry {
-            for (key, value) in defaults {
-                if !entries.iter().any(|(k, _)| *k == key) {
-                    entries.push((key, value));
+    /// Adds to the table at `path`, which is made where it is missing, the entries of `defaults` that it does not have.
+    pub(super) fn fill(&mut self, path: &[&str], defaults: Self) {
+        let Value::Table(entries) = &mut self.value else { return };
+        let Some((key, rest)) = path.split_first() else {
+            if let Value::Table(defaults) = defaults.value {
+                for (key, value) in defaults {
+                    if !entries.iter().any(|(k, _)| *k == key) {
+                        entries.push((key, value));
+                    }
                 }
             }
+            return;
+        };
+        if !entries.iter().any(|(k, _)| k == key) {
+            entries.push(((*key).to_owned(), Self { line: None, value: Value::Table(Vec::new()) }));
+        }
+        if let Some((_, node)) = entries.iter_mut().find(|(k, _)| k == key) {
+            node.fill(rest, defaults);
         }
     }
 

@@ -6,18 +6,22 @@ use serde::Deserialize;
 use sha2::{Digest, Sha256};
 
 use super::document::Node;
-use super::polygon::anticlockwise;
+use super::picture::{Gallery, Pictures};
+use super::polygon::{anticlockwise, signed_area};
 use super::robot::{RobotPreset, RobotSpec};
-use super::spec::{ShapeSpec, TextureSpec, WorldSpec};
+use super::spec::{BodySpec, CameraPreset, ShapeSpec, WindowSpec, WorldSpec};
 use super::structure::{self, Findings};
+use super::texture::Texture;
 use super::validate;
-use super::{Body, Footprint, World, Zone};
+use super::{Body, Footprint, Window, World, WorldFault, Zone};
 use crate::error::{Error, Result};
 use crate::geometry::{Pose, Vector2};
 use crate::panorama::INSTANCE_FIRST_WALL;
 
+/// Marks the source of a world that the program carries with it.
+const BUILTIN_SOURCE: &str = "builtin:";
 /// The worlds that the program carries with it, as (name, TOML text).
-const BUILTIN: [(&str, &str); 7] = [
+const BUILTIN: [(&str, &str); 8] = [
     ("lab", include_str!("../../worlds/lab.toml")),
     ("slippery", include_str!("../../worlds/slippery.toml")),
     ("crowd", include_str!("../../worlds/crowd.toml")),
@@ -25,7 +29,16 @@ const BUILTIN: [(&str, &str); 7] = [
     ("paper-grid", include_str!("../../worlds/paper-grid.toml")),
     ("proving-ground", include_str!("../../worlds/proving-ground.toml")),
     ("vardy-hall", include_str!("../../worlds/vardy-hall.toml")),
+    ("gallery", include_str!("../../worlds/gallery.toml")),
 ];
+/// The images of those worlds, by their path.
+const BUILTIN_IMAGES: [(&str, &[u8]); 2] = [
+    ("gallery/lab.png", include_bytes!("../../worlds/gallery/lab.png")),
+    ("gallery/poster.png", include_bytes!("../../worlds/gallery/poster.png")),
+];
+
+/// Thickness of a window's pane, m.
+const PANE_M: f64 = 0.01;
 
 impl World {
     /// Opens a world by what a person typed: the path of a file if there is one, else the name of a built-in world, as `NAME`
@@ -41,7 +54,7 @@ impl World {
         let bare = argument.strip_prefix("worlds/").unwrap_or(argument);
         let bare = bare.strip_suffix(".toml").unwrap_or(bare);
         match BUILTIN.iter().find(|(name, _)| *name == bare) {
-            Some((name, text)) => Self::from_toml(text, format!("builtin:{name}")),
+            Some((name, text)) => Self::from_toml(text, format!("{BUILTIN_SOURCE}{name}")),
             None => Err(Error::Invalid {
                 what: "world".to_owned(),
                 found: format!("{argument}, which is no file"),
@@ -76,23 +89,24 @@ impl World {
         schemars::schema_for!(WorldSpec).to_value()
     }
 
-    /// Checks a world given as TOML text. `source` names it in messages.
+    /// Checks a world given as TOML text. `source` names it in messages; images are looked for in its folder.
     ///
     /// # Errors
     /// As [`World::load`].
     pub fn from_toml(text: &str, source: impl AsRef<Path>) -> Result<Self> {
-        Self::from_tree(Node::from_toml(text, source.as_ref())?, source.as_ref(), sha256(text))
+        Self::from_tree(Node::from_toml(text, source.as_ref())?, source.as_ref(), text)
     }
 
-    /// Checks a world given as JSON text. `source` names it in messages.
+    /// Checks a world given as JSON text. `source` names it in messages; images are looked for in its folder.
     ///
     /// # Errors
     /// As [`World::load`].
     pub fn from_json(text: &str, source: impl AsRef<Path>) -> Result<Self> {
-        Self::from_tree(Node::from_json(text, source.as_ref())?, source.as_ref(), sha256(text))
+        Self::from_tree(Node::from_json(text, source.as_ref())?, source.as_ref(), text)
     }
 
-    /// Checks a world that a program made or changed. `source` names it in messages; the SHA-256 is that of its JSON form.
+    /// Checks a world that a program made or changed. `source` names it in messages, and images are looked for in its folder; the
+    /// SHA-256 is that of its JSON form.
     ///
     /// # Errors
     /// When it has faults; all of them come at once.
@@ -100,10 +114,10 @@ impl World {
         let parse_error = |message: String| Error::Parse { path: source.as_ref().to_owned(), message };
         let tree = Node::from_spec(spec).map_err(|e| parse_error(e.to_string()))?;
         let json = serde_json::to_string(spec).map_err(|e| parse_error(e.to_string()))?;
-        Self::from_tree(tree, source.as_ref(), sha256(&json))
+        Self::from_tree(tree, source.as_ref(), &json)
     }
 
-    fn from_tree(mut tree: Node, path: &Path, sha256: String) -> Result<Self> {
+    fn from_tree(mut tree: Node, path: &Path, text: &str) -> Result<Self> {
         let as_read = tree.clone(); // the check below removes unknown fields, whose lines are still wanted
         let Findings { unknown, not_finite, unreadable } = structure::check(&mut tree, &Self::json_schema());
         let mut faults = unknown;
@@ -112,13 +126,21 @@ impl World {
                 let parse_error = |message: String| Error::Parse { path: path.to_owned(), message };
                 let preset = RobotPreset::deserialize(preset).map_err(|e| parse_error(e.to_string()))?;
                 let robot = Node::from_spec(&RobotSpec::of(preset)).map_err(|e| parse_error(e.to_string()))?;
-                tree.fill("robot", robot);
+                tree.fill(&["robot"], robot);
+            }
+            if let Some(preset) = tree.get("camera").and_then(|camera| camera.get("preset")).cloned() {
+                let parse_error = |message: String| Error::Parse { path: path.to_owned(), message };
+                let preset = CameraPreset::deserialize(preset).map_err(|e| parse_error(e.to_string()))?;
+                let optics = Node::from_spec(&preset.optics()).map_err(|e| parse_error(e.to_string()))?;
+                tree.fill(&["camera", "optics"], optics);
             }
             let spec =
                 WorldSpec::deserialize(tree).map_err(|e| Error::Parse { path: path.to_owned(), message: e.to_string() })?;
             faults.extend(validate::check(&spec, &not_finite));
+            let (pictures, missing) = load_pictures(&spec, path);
+            faults.extend(missing);
             if faults.is_empty() && not_finite.is_empty() {
-                return Ok(Self::resolve(spec, path, sha256));
+                return Ok(Self::resolve(spec, path, sha256(text, &pictures), &pictures));
             }
         }
         faults.extend(not_finite);
@@ -131,48 +153,51 @@ impl World {
     }
 
     /// The checked form of a spec that has no faults. Never panics where the room has none.
-    pub(super) fn resolve(spec: WorldSpec, source: &Path, sha256: String) -> Self {
+    pub(super) fn resolve(spec: WorldSpec, source: &Path, sha256: String, pictures: &Pictures) -> Self {
         let outline = anticlockwise(&spec.room.outline_m);
         let clockwise = outline.get(1).is_some_and(|c| [c.x, c.y] != spec.room.outline_m[1]);
-        let seeded = |texture: &TextureSpec, n: u64| TextureSpec {
-            seed: Some(texture.seed.unwrap_or_else(|| spec.seed.wrapping_mul(1000).wrapping_add(n))),
-            ..*texture
-        };
+        let seed = |n: u64| spec.seed.wrapping_mul(1000).wrapping_add(n);
         let walls = &spec.room.walls;
         let wall_textures: Vec<_> = (0..outline.len())
             .map(|k| {
                 // A clockwise outline is turned round; its walls keep the textures that they have in the file.
                 let as_written = if clockwise { outline.len() - 1 - k } else { k };
-                seeded(&walls[as_written % walls.len()], 10 + as_written as u64)
+                Texture::new(&walls[as_written % walls.len()], seed(10 + as_written as u64), pictures)
             })
             .collect();
         let first_body = INSTANCE_FIRST_WALL + outline.len() as u16;
-        let bodies = spec
+        let bodies: Vec<_> = spec
             .landmarks
             .iter()
             .chain(&spec.obstacles)
             .enumerate()
             .map(|(k, b)| Body {
                 name: b.name.clone(),
-                footprint: match &b.shape {
-                    ShapeSpec::Disc { radius_m } => Footprint::Disc(*radius_m),
-                    ShapeSpec::Box { size_m: [x, y] } => {
-                        let (x, y) = (0.5 * x, 0.5 * y);
-                        Footprint::Polygon(vec![
-                            Vector2::new(-x, -y),
-                            Vector2::new(x, -y),
-                            Vector2::new(x, y),
-                            Vector2::new(-x, y),
-                        ])
-                    }
-                    ShapeSpec::Polygon { corners_m } => Footprint::Polygon(anticlockwise(corners_m)),
-                },
+                footprint: footprint(b),
                 pose: Pose::new(b.position_m[0], b.position_m[1], b.heading_deg.to_radians()),
                 bottom_m: b.elevation_m,
                 top_m: b.elevation_m + b.height_m,
-                texture: seeded(&b.texture, 100 + k as u64),
+                texture: Texture::new(&b.texture, seed(100 + k as u64), pictures),
+                glow: b.glow,
                 motion: b.motion.clone(),
                 instance: first_body + k as u16,
+            })
+            .collect();
+        let first_window = first_body + bodies.len() as u16;
+        let windows = spec
+            .light
+            .windows
+            .iter()
+            .enumerate()
+            .map(|(k, w)| Window {
+                name: if w.name.is_empty() { format!("window in wall {}", w.wall) } else { w.name.clone() },
+                footprint: pane(w, &spec.room.outline_m),
+                bottom_m: w.height_m[0],
+                top_m: w.height_m[1],
+                // Far from the bodies' seeds, so that a further body changes no window.
+                texture: Texture::new(&w.texture, seed(u64::MAX / 2 + k as u64), pictures),
+                brightness: w.brightness,
+                instance: first_window + k as u16,
             })
             .collect();
         let zones =
@@ -180,11 +205,12 @@ impl World {
         let home = Pose::new(spec.home.x_m, spec.home.y_m, spec.home.heading_deg.to_radians());
         Self {
             wall_textures,
-            floor_texture: seeded(&spec.room.floor, 1),
-            ceiling_texture: seeded(&spec.room.ceiling, 2),
+            floor_texture: Texture::new(&spec.room.floor, seed(1), pictures),
+            ceiling_texture: Texture::new(&spec.room.ceiling, seed(2), pictures),
             landmark_count: spec.landmarks.len(),
             outline,
             bodies,
+            windows,
             zones,
             home,
             source: source.to_owned(),
@@ -194,7 +220,56 @@ impl World {
     }
 }
 
-/// SHA-256 of a text's bytes, lower-case hexadecimal.
-fn sha256(text: &str) -> String {
-    Sha256::digest(text.as_bytes()).iter().map(|b| format!("{b:02x}")).collect()
+fn footprint(body: &BodySpec) -> Footprint {
+    match &body.shape {
+        ShapeSpec::Disc { radius_m } => Footprint::Disc(*radius_m),
+        ShapeSpec::Box { size_m: [x, y] } => {
+            let (x, y) = (0.5 * x, 0.5 * y);
+            Footprint::Polygon(vec![Vector2::new(-x, -y), Vector2::new(x, -y), Vector2::new(x, y), Vector2::new(-x, y)])
+        }
+        ShapeSpec::Polygon { corners_m } => Footprint::Polygon(anticlockwise(corners_m)),
+    }
+}
+
+/// Footprint of a window's pane, which lies on its wall. Empty where there is no such wall.
+fn pane(window: &WindowSpec, outline: &[[f64; 2]]) -> Vec<Vector2<f64>> {
+    let Some(&[x, y]) = outline.get(window.wall) else { return Vec::new() };
+    let first = Vector2::new(x, y);
+    let [x, y] = outline[(window.wall + 1) % outline.len()];
+    let along = Vector2::new(x, y) - first;
+    let along = along / along.norm().max(1e-9);
+    let corners: Vec<_> = outline.iter().map(|&[x, y]| Vector2::new(x, y)).collect();
+    let inward = Vector2::new(-along.y, along.x) * signed_area(&corners).signum();
+    let [a, b] = window.along_m.map(|s| first + along * s);
+    // Seen from the room, the pane's own left comes first.
+    let (left, right) = if signed_area(&corners) > 0.0 { (b, a) } else { (a, b) };
+    vec![left + inward * PANE_M, right + inward * PANE_M, right, left]
+}
+
+/// Reads all images of a world; those that cannot be had are faults.
+fn load_pictures(spec: &WorldSpec, source: &Path) -> (Pictures, Vec<WorldFault>) {
+    let builtin = source.to_str().is_some_and(|s| s.starts_with(BUILTIN_SOURCE));
+    let gallery = if builtin {
+        Gallery::Builtin(&BUILTIN_IMAGES)
+    } else {
+        Gallery::Folder(source.parent().map(Path::to_owned).unwrap_or_default())
+    };
+    let mut pictures = Pictures::default();
+    let mut faults = Vec::new();
+    for (place, texture) in spec.textures() {
+        if let Some(Err((found, allowed))) = texture.image.as_ref().map(|path| pictures.load(path, &gallery)) {
+            faults.push(WorldFault { place: format!("{place}.image"), found, allowed, owner: None, line: None });
+        }
+    }
+    (pictures, faults)
+}
+
+/// SHA-256 of a text's bytes and those of the images, lower-case hexadecimal.
+fn sha256(text: &str, pictures: &Pictures) -> String {
+    let mut hash = Sha256::new();
+    hash.update(text.as_bytes());
+    for file in &pictures.files {
+        hash.update(file);
+    }
+    hash.finalize().iter().map(|b| format!("{b:02x}")).collect()
 }

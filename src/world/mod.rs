@@ -3,24 +3,32 @@
 //! [`WorldSpec`] is the file as written, [`World`] the checked form: absolute corners, radians, instance ids. Loading reports
 //! every fault of a file at once; see [`WorldFault`]. It goes through three gates: the text becomes a tree that knows its
 //! lines (`document`), the tree is compared with the schema (`structure`), and the spec's values and places are checked
-//! (`validate`). A [`World`] also tells where a robot may stand and start (`free`).
+//! (`validate`); the images that it shows are read on the way (`picture`). A [`World`] also tells where a robot may stand and start (`free`).
 
+mod camera;
 pub mod convex;
 mod document;
 mod free;
+mod light;
 mod load;
+mod picture;
 pub mod polygon;
 pub mod robot;
 pub mod spec;
 mod structure;
+mod texture;
 mod validate;
 
 use std::path::PathBuf;
 
 use crate::geometry::{Pose, Vector2};
-use crate::panorama::{INSTANCE_FIRST_WALL, Projection};
+use crate::panorama::{INSTANCE_CEILING, INSTANCE_FIRST_WALL, INSTANCE_FLOOR, Projection};
+pub use camera::{CameraPreset, OpticsSpec};
+pub use light::LightPreset;
+pub use picture::Picture;
 pub use robot::RobotSpec;
 pub use spec::{MotionSpec, TaskSpec, TextureFamily, TextureSpec, WorldSpec};
+pub use texture::{Pattern, Texture};
 
 /// One fault of a world file.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -57,20 +65,23 @@ pub struct World {
     pub spec: WorldSpec,
     /// Where it was loaded from; `builtin:NAME` for a built-in world.
     pub source: PathBuf,
-    /// SHA-256 of the file's bytes, lower-case hexadecimal.
+    /// SHA-256 of the file's bytes, followed by those of the images that it shows in the order of first use, lower-case
+    /// hexadecimal.
     pub sha256: String,
     /// Corners of the room, anti-clockwise, m. Wall k runs from corner k to corner k + 1.
     pub outline: Vec<Vector2<f64>>,
-    /// Texture of each wall, with its seed filled in.
-    pub wall_textures: Vec<TextureSpec>,
-    /// Texture of the floor, with its seed filled in.
-    pub floor_texture: TextureSpec,
-    /// Texture of the ceiling, with its seed filled in.
-    pub ceiling_texture: TextureSpec,
+    /// Texture of each wall.
+    pub wall_textures: Vec<Texture>,
+    /// Texture of the floor.
+    pub floor_texture: Texture,
+    /// Texture of the ceiling.
+    pub ceiling_texture: Texture,
     /// Landmarks first, then obstacles, each in the file's order.
     pub bodies: Vec<Body>,
     /// How many of `bodies` are landmarks.
     pub landmark_count: usize,
+    /// Windows, in the file's order.
+    pub windows: Vec<Window>,
     /// Floor zones.
     pub zones: Vec<Zone>,
     /// Home pose.
@@ -99,8 +110,10 @@ pub struct Body {
     pub bottom_m: f64,
     /// Height of the top, m.
     pub top_m: f64,
-    /// Texture, with its seed filled in.
-    pub texture: TextureSpec,
+    /// Texture.
+    pub texture: Texture,
+    /// Light that it gives off.
+    pub glow: f64,
     /// How it moves.
     pub motion: Option<MotionSpec>,
     /// Instance id in panoramas.
@@ -113,6 +126,25 @@ impl Body {
     pub fn stands(&self) -> bool {
         matches!(self.motion, None | Some(MotionSpec::Pushed { .. }))
     }
+}
+
+/// A window of a checked world: a thin pane on a wall, of which only renderers know.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Window {
+    /// Name from the file, or its wall.
+    pub name: String,
+    /// Corners of the pane in the room, anti-clockwise, m. The first two are on the side of the room.
+    pub footprint: Vec<Vector2<f64>>,
+    /// Height of the lower edge, m.
+    pub bottom_m: f64,
+    /// Height of the upper edge, m.
+    pub top_m: f64,
+    /// What is seen in it.
+    pub texture: Texture,
+    /// Irradiance that a square metre of it makes on a facing surface 1 m away.
+    pub brightness: f64,
+    /// Instance id in panoramas.
+    pub instance: u16,
 }
 
 /// A floor zone of a checked world.
@@ -148,7 +180,31 @@ impl World {
     #[must_use]
     pub fn projection_of_size(&self, width: u32, height: u32) -> Projection {
         let c = &self.spec.camera;
-        Projection { width, height, horizon_row: f64::from(height) * c.horizon, mount_rad: c.mount_deg.to_radians() }
+        Projection {
+            width,
+            height,
+            horizon_row: f64::from(height) * c.horizon,
+            mount_rad: c.mount_deg.to_radians(),
+            kind: c.projection,
+        }
+    }
+
+    /// Where the camera is when the robot is at `robot`, in the room; its heading is the robot's.
+    #[must_use]
+    pub fn camera_pose(&self, robot: &Pose) -> Pose {
+        let [forward, left] = self.spec.camera.offset_m;
+        let at = robot.transform(Vector2::new(forward, left));
+        Pose { x: at.x, y: at.y, ..*robot }
+    }
+
+    /// What the instance ids of panoramas stand for, in order.
+    #[must_use]
+    pub fn instances(&self) -> Vec<(u16, String)> {
+        let planes = [(INSTANCE_FLOOR, "floor".to_owned()), (INSTANCE_CEILING, "ceiling".to_owned())];
+        let walls = (0..self.outline.len()).map(|k| (self.wall_instance(k), format!("wall {k}")));
+        let bodies = self.bodies.iter().map(|b| (b.instance, b.name.clone()));
+        let windows = self.windows.iter().map(|w| (w.instance, w.name.clone()));
+        planes.into_iter().chain(walls).chain(bodies).chain(windows).collect()
     }
 
     /// Poses of all bodies at time 0, in the order of [`World::bodies`].

@@ -7,6 +7,10 @@ use serde::{Deserialize, Serialize};
 
 use super::robot::RobotSpec;
 
+pub use super::camera::{CameraPreset, CameraSpec, DirtSpec, NoiseSpec, OpticsSpec};
+pub use super::light::{LampSpec, LightFactors, LightPreset, LightSpec, WindowSpec};
+pub use super::texture::{TextureFamily, TextureSpec};
+
 /// A whole world file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -24,7 +28,7 @@ pub struct WorldSpec {
     /// Friction of the floor.
     #[serde(default)]
     pub floor: FloorSpec,
-    /// Lamps and ambient light.
+    /// Ambient light, lamps and windows.
     #[serde(default)]
     pub light: LightSpec,
     /// Bodies that serve as landmarks: their centres are what the `ideal` sensor sees.
@@ -101,65 +105,6 @@ impl RoomSpec {
     }
 }
 
-/// Pattern families; each is drawn from a seed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum TextureFamily {
-    /// One colour.
-    Plain,
-    /// Smooth noise over several octaves.
-    Noise,
-    /// Brickwork with mortar joints.
-    Brick,
-    /// Boards with grain.
-    Planks,
-    /// Square tiles with joints, each of its own shade.
-    Tiles,
-    /// A poster wall: panels with bars, discs and glyph-like strokes.
-    Posters,
-    /// Shelves of books: upright blocks of many widths, heights and colours.
-    Shelves,
-    /// Horizontal bands, the same from all sides: no azimuth can be read off inside them.
-    Bands,
-}
-
-/// How a surface looks.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct TextureSpec {
-    /// Pattern family.
-    pub family: TextureFamily,
-    /// Base colour: red, green, blue, 0 to 255.
-    #[serde(default = "TextureSpec::default_colour")]
-    pub colour: [u8; 3],
-    /// Edge length of the square of surface that the pattern covers before it repeats, m.
-    #[serde(default = "TextureSpec::default_period")]
-    pub period_m: f64,
-    /// Strength of the pattern, 0 (plain) to 1.
-    #[serde(default = "TextureSpec::default_contrast")]
-    pub contrast: f64,
-    /// Seed of the pattern; by default each surface of a world gets its own.
-    #[serde(default)]
-    pub seed: Option<u64>,
-}
-
-impl TextureSpec {
-    /// A texture of the given family and colour with default period and contrast.
-    #[must_use]
-    pub fn new(family: TextureFamily, colour: [u8; 3]) -> Self {
-        Self { family, colour, period_m: Self::default_period(), contrast: Self::default_contrast(), seed: None }
-    }
-    fn default_colour() -> [u8; 3] {
-        [170, 165, 155]
-    }
-    fn default_period() -> f64 {
-        4.0
-    }
-    fn default_contrast() -> f64 {
-        0.6
-    }
-}
-
 /// Floor friction: a base value and zones that replace it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
@@ -187,32 +132,6 @@ pub struct ZoneSpec {
     pub polygon_m: Vec<[f64; 2]>,
     /// Coulomb friction inside.
     pub friction: f64,
-}
-
-/// Light. Intensities are relative: ambient plus lamps of about 1 in all show a texture's own colour.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, default)]
-pub struct LightSpec {
-    /// Share of light that comes from everywhere.
-    pub ambient: f64,
-    /// Lamps.
-    pub lamps: Vec<LampSpec>,
-}
-
-impl Default for LightSpec {
-    fn default() -> Self {
-        Self { ambient: 0.9, lamps: Vec::new() }
-    }
-}
-
-/// A point lamp with Lambert shading and inverse-square falloff; it casts no shadows.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct LampSpec {
-    /// Position x, y, z, m.
-    pub position_m: [f64; 3],
-    /// Irradiance that a facing surface gets at 1 m.
-    pub intensity: f64,
 }
 
 /// Shape of a body's footprint.
@@ -256,6 +175,9 @@ pub struct BodySpec {
     pub elevation_m: f64,
     /// Texture of its sides and top.
     pub texture: TextureSpec,
+    /// Light that it gives off itself: it looks as if lit by that much more.
+    #[serde(default)]
+    pub glow: f64,
     /// How it moves; obstacles only.
     #[serde(default)]
     pub motion: Option<MotionSpec>,
@@ -295,28 +217,6 @@ pub enum MotionSpec {
 impl MotionSpec {
     fn default_friction() -> f64 {
         0.4
-    }
-}
-
-/// The panoramic camera.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, default)]
-pub struct CameraSpec {
-    /// Columns.
-    pub width_px: u32,
-    /// Rows.
-    pub height_px: u32,
-    /// Height of the camera's centre above the floor, m. It sits above the middle of the axle.
-    pub height_m: f64,
-    /// Direction of column 0 from the robot's heading, degrees.
-    pub mount_deg: f64,
-    /// Share of the rows above the horizon.
-    pub horizon: f64,
-}
-
-impl Default for CameraSpec {
-    fn default() -> Self {
-        Self { width_px: 1440, height_px: 180, height_m: 0.4, mount_deg: 0.0, horizon: 0.6 }
     }
 }
 
@@ -401,4 +301,17 @@ pub enum DisturbanceKind {
     },
     /// The robot is lifted and set down at rest somewhere else. Neither encoders nor gyro notice.
     Kidnap(PoseSpec),
+}
+
+impl WorldSpec {
+    /// All textures and their places in the file.
+    pub(super) fn textures(&self) -> impl Iterator<Item = (String, &TextureSpec)> {
+        let room = &self.room;
+        let walls = room.walls.iter().enumerate().map(|(k, t)| (format!("room.walls[{k}]"), t));
+        let planes = [("room.floor".to_owned(), &room.floor), ("room.ceiling".to_owned(), &room.ceiling)];
+        let windows = self.light.windows.iter().enumerate().map(|(k, w)| (format!("light.windows[{k}].texture"), &w.texture));
+        let landmarks = self.landmarks.iter().enumerate().map(|(k, b)| (format!("landmarks[{k}].texture"), &b.texture));
+        let obstacles = self.obstacles.iter().enumerate().map(|(k, b)| (format!("obstacles[{k}].texture"), &b.texture));
+        walls.chain(planes).chain(landmarks).chain(obstacles).chain(windows)
+    }
 }

@@ -41,11 +41,12 @@ impl Sensor for IdealSensor<'_> {
 
 /// Bearings of all visible landmarks, in the order of their ids.
 fn look(world: &World, robot: Pose, bodies: &[Pose]) -> Vec<Bearing> {
+    let camera = world.camera_pose(&robot);
     (0..world.landmark_count)
-        .filter(|&k| !hidden(world, bodies, robot.position(), k))
+        .filter(|&k| !hidden(world, bodies, camera.position(), k))
         .map(|k| Bearing {
             id: LandmarkId(k as u32),
-            azimuth_rad: angle_of(robot.inverse_transform(bodies[k].position())),
+            azimuth_rad: angle_of(camera.inverse_transform(bodies[k].position())),
             sd_rad: STATED_SD_RAD,
         })
         .collect()

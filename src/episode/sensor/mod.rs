@@ -14,7 +14,7 @@ mod sight;
 pub use degraded::{Degradation, DegradedSensor};
 pub use ideal::IdealSensor;
 pub use noisy::{Noise, NoisySensor};
-pub use rendered::RenderedSensor;
+pub use rendered::{RenderedSensor, Sight};
 
 use crate::error::Result;
 use crate::geometry::Pose;

@@ -35,6 +35,12 @@ impl Canvas {
         Self { size, period, base, pixels: vec![base; size * size] }
     }
 
+    /// Replaces all pixels by `pixels`, v fastest.
+    pub fn fill(&mut self, pixels: Vec<Colour>) {
+        debug_assert_eq!(pixels.len(), self.pixels.len());
+        self.pixels = pixels;
+    }
+
     /// Length that `count_per_period` equal parts have; at least one part, about `length_m` long.
     pub fn divide(&self, length_m: f64) -> (usize, f64) {
         let count = libm::round(self.period / length_m).clamp(1.0, (self.size / 2).max(1) as f64);

@@ -69,6 +69,10 @@ impl MapDrawing {
         let clip = ClipPath::new().set("id", "room").add(polygon(&room));
         self.add(Definitions::new().add(clip));
         self.add(self.frame.draw_grid().set("clip-path", "url(#room)"));
+        for window in &world.windows {
+            let pane = polygon(&self.page(&window.footprint)).set("fill", "none");
+            self.add(pane.set("stroke", "#74b9ee").set("stroke-width", WALL_PX));
+        }
         for (zone, spec) in world.zones.iter().zip(&world.spec.floor.zones) {
             let area = polygon(&self.page(&zone.polygon));
             self.add(area.set("fill", friction_colour(zone.friction)).set("stroke", "#8fa3b5").set("stroke-width", 0.8));

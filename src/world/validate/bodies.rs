@@ -11,7 +11,7 @@ use crate::world::{Body, Footprint, MotionSpec, World, WorldSpec};
 /// Least length of a path's leg, m.
 const LEAST_LEG_M: f64 = 0.01;
 
-/// Most walls and bodies together: instance ids have 16 bits, and the first ones are the floor's and the ceiling's.
+/// Most walls, bodies and windows together: instance ids have 16 bits, and the first ones are the floor's and the ceiling's.
 const MOST_INSTANCES: usize = 65_000;
 
 /// Fields of a body that say where it is and how far it reaches.
@@ -33,9 +33,9 @@ pub(super) fn check_values(spec: &WorldSpec, faults: &mut Faults) {
         faults.unless(landmark.motion.is_none(), format!("landmarks[{k}].motion"), "a motion", allowed);
     }
     faults.distinct(bodies().map(|(place, body)| (place, body.name.as_str())));
-    let instances = spec.room.outline_m.len() + spec.landmarks.len() + spec.obstacles.len();
+    let instances = spec.room.outline_m.len() + spec.landmarks.len() + spec.obstacles.len() + spec.light.windows.len();
     let allowed = format!("at most {MOST_INSTANCES}");
-    faults.unless(instances <= MOST_INSTANCES, "obstacles", format!("{instances} walls and bodies in all"), allowed);
+    faults.unless(instances <= MOST_INSTANCES, "obstacles", format!("{instances} walls, bodies and windows in all"), allowed);
 }
 
 fn check_body(place: &str, body: &BodySpec, spec: &WorldSpec, faults: &mut Faults) {
@@ -61,6 +61,7 @@ fn check_body(place: &str, body: &BodySpec, spec: &WorldSpec, faults: &mut Fault
     faults.size(format!("{place}.height_m"), body.height_m);
     faults.between(format!("{place}.elevation_m"), body.elevation_m, 0.0, GREATEST_M);
     texture(&format!("{place}.texture"), &body.texture, faults);
+    faults.between(format!("{place}.glow"), body.glow, 0.0, 100.0);
 
     let top = body.elevation_m + body.height_m;
     let heights = [format!("{place}.height_m"), format!("{place}.elevation_m"), "room.height_m".to_owned()];

@@ -5,12 +5,15 @@
 //! of the pen gives one message and not ten.
 
 mod bodies;
+mod camera;
+mod light;
 mod robot;
 mod room;
 mod starts;
 
 use std::path::Path;
 
+use super::picture::Pictures;
 use super::polygon::{edges, reflex_corner, self_intersection, signed_area};
 use super::{World, WorldFault, WorldSpec};
 use crate::geometry::Vector2;
@@ -31,6 +34,8 @@ pub(super) fn check(spec: &WorldSpec, known: &[WorldFault]) -> Vec<WorldFault> {
     check_name(spec, &mut faults);
     room::check_values(spec, &mut faults);
     bodies::check_values(spec, &mut faults);
+    light::check_values(spec, &mut faults);
+    camera::check(spec, &mut faults);
     robot::check(spec, &mut faults);
     starts::check_values(spec, &mut faults);
     starts::check_disturbances(spec, &mut faults);
@@ -38,7 +43,7 @@ pub(super) fn check(spec: &WorldSpec, known: &[WorldFault]) -> Vec<WorldFault> {
         return faults.found; // without a room nothing has a place
     }
     // Geometry comes from the resolved form, the same that a run uses. Bodies with faulty geometry are left out of it.
-    let mut world = World::resolve(spec.clone(), Path::new(""), String::new());
+    let mut world = World::resolve(spec.clone(), Path::new(""), String::new(), &Pictures::default());
     let mut places = Vec::new();
     let mut sound = Vec::new();
     for place in bodies::places(spec) {
@@ -51,6 +56,7 @@ pub(super) fn check(spec: &WorldSpec, known: &[WorldFault]) -> Vec<WorldFault> {
     places.retain(|_| *keep.next().unwrap_or(&false));
 
     room::check_places(&world, &mut faults);
+    light::check_places(&world, &mut faults);
     bodies::check_places(&world, &places, &mut faults);
     starts::check_places(&world, &mut faults);
     faults.found

@@ -1,4 +1,4 @@
-//! The robot, its camera and its task.
+//! The robot and its task.
 
 use super::{Faults, GREATEST_M};
 use crate::world::WorldSpec;
@@ -8,7 +8,6 @@ pub(super) fn check(spec: &WorldSpec, faults: &mut Faults) {
     check_body(spec, faults);
     check_drive(spec, faults);
     check_gyro_and_faults(spec, faults);
-    check_camera(spec, faults);
     check_task(spec, faults);
 }
 
@@ -103,26 +102,6 @@ fn check_gyro_and_faults(spec: &WorldSpec, faults: &mut Faults) {
             faults.between(format!("{place}.what.worn-tyre.friction_factor"), friction_factor, 0.0, 10.0);
             faults.between(format!("{place}.what.worn-tyre.radius_factor"), radius_factor, 0.5, 1.5);
         }
-    }
-}
-
-fn check_camera(spec: &WorldSpec, faults: &mut Faults) {
-    let c = &spec.camera;
-    let pixels = |value: u32, low, high| ((low..=high).contains(&value), value.to_string(), format!("{low} to {high}"));
-    for (place, (good, found, allowed)) in
-        [("camera.width_px", pixels(c.width_px, 16, 16_384)), ("camera.height_px", pixels(c.height_px, 8, 4_096))]
-    {
-        faults.unless(good, place, found, allowed);
-    }
-    faults.between("camera.mount_deg", c.mount_deg, -360.0, 360.0);
-    faults.between("camera.horizon", c.horizon, 0.0, 1.0);
-    if !faults.touch("room.height_m") {
-        faults.unless(
-            c.height_m > 0.0 && c.height_m < spec.room.height_m,
-            "camera.height_m",
-            c.height_m.to_string(),
-            format!("more than 0, less than the room's height, {}", spec.room.height_m),
-        );
     }
 }
 

@@ -1,8 +1,8 @@
-//! The room itself: outline, surfaces, floor zones, light.
+//! The room itself: outline, surfaces, floor zones.
 
 use super::{Faults, GREATEST_M, TOLERANCE_M};
 use crate::geometry::Vector2;
-use crate::world::polygon::{contains, contains_segment, edges};
+use crate::world::polygon::{contains_segment, edges};
 use crate::world::spec::TextureSpec;
 use crate::world::{World, WorldSpec};
 
@@ -30,18 +30,19 @@ pub(super) fn check_values(spec: &WorldSpec, faults: &mut Faults) {
     }
     let zones = spec.floor.zones.iter().enumerate().filter(|(_, z)| !z.name.is_empty());
     faults.distinct(zones.map(|(k, z)| (format!("floor.zones[{k}]"), z.name.as_str())));
-
-    faults.between("light.ambient", spec.light.ambient, 0.0, 10.0);
-    for (k, lamp) in spec.light.lamps.iter().enumerate() {
-        faults.point(&format!("light.lamps[{k}].position_m"), &lamp.position_m);
-        faults.between(format!("light.lamps[{k}].intensity"), lamp.intensity, 0.0, 1e4);
-    }
 }
 
 /// A texture's numbers.
 pub(super) fn texture(place: &str, texture: &TextureSpec, faults: &mut Faults) {
+    match (texture.family, &texture.image) {
+        (None, None) => faults.add(place, "neither family nor image", "one of them"),
+        (Some(_), Some(_)) => faults.add(format!("{place}.image"), "an image beside a family", "one of them"),
+        _ => {}
+    }
     faults.between(format!("{place}.period_m"), texture.period_m, 0.01, GREATEST_M);
-    faults.between(format!("{place}.contrast"), texture.contrast, 0.0, 1.0);
+    if let Some(contrast) = texture.contrast {
+        faults.between(format!("{place}.contrast"), contrast, 0.0, 1.0);
+    }
 }
 
 pub(super) fn check_places(world: &World, faults: &mut Faults) {
@@ -49,15 +50,6 @@ pub(super) fn check_places(world: &World, faults: &mut Faults) {
         let place = format!("floor.zones[{k}].polygon_m");
         if !faults.touch(&place) {
             polygon_inside(world, &zone.polygon, &place, faults);
-        }
-    }
-    for (k, lamp) in world.spec.light.lamps.iter().enumerate() {
-        let [x, y, z] = lamp.position_m;
-        let place = format!("light.lamps[{k}].position_m");
-        if !faults.touch(&place) && !faults.touch("room.height_m") {
-            let inside = contains(&world.outline, [x, y].into()) && z > 0.0 && z <= world.spec.room.height_m;
-            let allowed = format!("a point in the room, between the floor and its ceiling at {} m", world.spec.room.height_m);
-            faults.unless(inside, place, format!("{:?}", lamp.position_m), allowed);
         }
     }
 }
