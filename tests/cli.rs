@@ -372,6 +372,10 @@ fn a_table_of_commands_is_driven_and_recorded() {
     assert_eq!((number(last, "t_s"), summary["time_s"].as_f64()), (3.05, Some(3.05)));
     let drift = (number(last, "x_odom_m") - number(last, "x_m")).hypot(number(last, "y_odom_m") - number(last, "y_m"));
     assert!((summary["odometry_drift_m"].as_f64().unwrap() - drift).abs() < 1e-12 && drift > 0.0);
+    // Every collision is in a table of its own, with time, body and impulse.
+    let hits = std::fs::read_to_string(folder.path().join("first/collisions.csv")).unwrap();
+    assert_eq!(hits.lines().next(), Some("t_s,with,impulse_n_s"));
+    assert_eq!(hits.lines().count() - 1, summary["collisions"].as_u64().unwrap() as usize);
     // Forces over an interval make the momentum gained in it: here straight ahead, from rest.
     let mass = 2.3;
     let force: f64 = ["left", "right", "caster"].iter().map(|w| number(&rows[2], &format!("force_{w}_forward_n"))).sum();
@@ -385,4 +389,20 @@ fn a_table_of_commands_is_driven_and_recorded() {
     }
     assert_fails(&run(folder.path(), &["drive", LAB]), 2, &["--commands"]);
     assert!(!folder.path().join("results").exists(), "a failure leaves no folder behind");
+}
+
+#[test]
+fn the_physics_report_holds_its_closed_forms() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = run(folder.path(), &["physics-report", "--json", "--out", "page"]);
+    assert_done(&output);
+    let printed: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let page = std::fs::read_to_string(folder.path().join("page/README.md")).unwrap();
+    for form in printed["closed_forms"].as_array().unwrap() {
+        let (difference, allowed) = (form["greatest_difference"].as_f64().unwrap(), form["allowed"].as_f64().unwrap());
+        assert!(difference <= allowed, "{form}");
+        let drawing = format!("{}.svg", form["name"].as_str().unwrap());
+        assert!(page.contains(&drawing) && folder.path().join("page").join(&drawing).is_file(), "{drawing}");
+    }
+    assert!(page.contains("| 0 rises |"), "{page}");
 }

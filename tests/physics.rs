@@ -7,6 +7,7 @@
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
+use rand::RngExt;
 use wayhome::geometry::{Pose, Twist, Vector2, cross, wrap};
 use wayhome::physics::{
     Chassis, PlanarVelocity, Plant, PlantStep, RapierPlant, STANDARD_GRAVITY_M_S2 as G, UnicyclePlant, WheelDrive,
@@ -65,7 +66,7 @@ fn distance(a: Pose, b: Pose) -> f64 {
     (a.position() - b.position()).norm()
 }
 
-/// Pushed sideways at v0 the robot stops after v0^2 / (2 mu g) = 0.1019 m; 0.5 %.
+/// Pushed sideways at v0 the robot stops after v0^2 / (2 mu g) = 0.1019 m (work of Coulomb friction, mu m g s = m v0^2 / 2); 0.5 %.
 #[test]
 fn a_sideways_push_stops_after_its_friction_distance() {
     let expected = 1.0 / (2.0 * 0.5 * G);
@@ -85,7 +86,8 @@ fn a_sideways_push_stops_after_its_friction_distance() {
     assert!(plant.truth().x.abs() < 1e-9 && plant.truth().heading.abs() < 1e-9);
 }
 
-/// However strong the motors, the floor pulls with mu g = 4.905 m/s^2 at most; 0.1 %. On ice the wheels spin and the robot
+/// However strong the motors, the floor pulls with mu g = 4.905 m/s^2 at most (Coulomb; Wong, "Theory of Ground Vehicles",
+/// maximum tractive effort); 0.1 %. On ice the wheels spin and the robot
 /// hardly moves.
 #[test]
 fn traction_ends_at_the_friction_limit() {
@@ -108,7 +110,8 @@ fn traction_ends_at_the_friction_limit() {
     assert!(chassis.wheel_speeds()[0] * chassis.wheel_radii()[0] > 10.0 * chassis.axle_velocity().x);
 }
 
-/// Within the friction limit a torque tau on each wheel gives a = 2 tau / (R (m + 2 I_w / R^2)); 0.1 %.
+/// Within the friction limit a torque tau on each wheel gives a = 2 tau / (R (m + 2 I_w / R^2)) (Newton and Euler for body and
+/// rolling wheels; Wong's mass factor for rotating parts); 0.1 %.
 #[test]
 fn launch_without_skid_follows_the_torque() {
     let robot = symmetric_robot();
@@ -128,7 +131,7 @@ fn launch_without_skid_follows_the_torque() {
     assert!(chassis.axle_velocity().y.abs() < 1e-12);
 }
 
-/// Locked wheels brake a spin with mu m g (b/2) / I_zz; 0.1 %.
+/// Locked wheels, dragged across at half the track b, brake a spin with mu m g (b/2) / I_zz (Euler, Coulomb); 0.1 %.
 #[test]
 fn locked_wheels_brake_a_spin() {
     let robot = symmetric_robot();
@@ -170,7 +173,8 @@ fn energy_never_rises_without_torque() {
     }
 }
 
-/// Speed at which a robot that slowly gains speed on a circle of radius 0.5 m begins to skid: sqrt(mu g r); 5 %.
+/// Speed at which a robot that slowly gains speed on a circle of radius 0.5 m begins to skid: sqrt(mu g r) (Coulomb
+/// friction as the only centripetal force; Gillespie, "Fundamentals of Vehicle Dynamics", cornering); 5 %.
 #[test]
 fn grip_on_a_circle_ends_at_the_friction_limit() {
     let radius = 0.5;
@@ -245,19 +249,30 @@ const TOUR: [(f64, f64, f64); 4] = [(0.3, 0.0, 2.0), (0.2, 1.2, 2.0), (0.0, -1.9
 #[test]
 fn mirrored_commands_give_mirrored_paths_and_a_turned_world_a_turned_path() {
     let world = with_robot(world(12.0, ""), RobotSpec { wheel_radius_error: [0.0; 2], ..RobotSpec::default() });
-    let run = |start: Pose, sign: f64| {
-        let mut plant = RapierPlant::new(&world, start, Seed(1));
-        drive(&mut plant, &TOUR.map(|(v, omega, t)| (v, sign * omega, t)));
-        plant.truth()
-    };
-    let path = run(Pose::IDENTITY, 1.0);
-    let mirrored = run(Pose::IDENTITY, -1.0);
-    assert!((path.x - mirrored.x).abs() < 1e-9 && (path.y + mirrored.y).abs() < 1e-9, "{path:?} {mirrored:?}");
-    assert!(wrap(path.heading + mirrored.heading).abs() < 1e-9);
+    let mut stream = Seed(21).stream("tours");
+    let mut draw = |low: f64, high: f64| low + (high - low) * stream.random::<f64>();
+    for k in 0..20 {
+        let mut world = world.clone();
+        let tour = if k == 0 {
+            TOUR
+        } else {
+            world.spec.floor.friction = draw(0.02, 0.8);
+            std::array::from_fn(|_| (draw(-0.3, 0.3), draw(-1.9, 1.9), draw(0.5, 2.0)))
+        };
+        let run = |start: Pose, sign: f64| {
+            let mut plant = RapierPlant::new(&world, start, Seed(1));
+            drive(&mut plant, &tour.map(|(v, omega, t)| (v, sign * omega, t)));
+            plant.truth()
+        };
+        let path = run(Pose::IDENTITY, 1.0);
+        let mirrored = run(Pose::IDENTITY, -1.0);
+        assert!((path.x - mirrored.x).abs() < 1e-9 && (path.y + mirrored.y).abs() < 1e-9, "{k}: {path:?} {mirrored:?}");
+        assert!(wrap(path.heading + mirrored.heading).abs() < 1e-9);
 
-    let frame = Pose::new(-0.7, 0.4, 2.2);
-    let turned = run(frame, 1.0);
-    assert!(distance(frame.compose(&path), turned) < 1e-9, "{path:?} {turned:?}");
+        let frame = Pose::new(draw(-1.0, 1.0), draw(-1.0, 1.0), draw(-PI, PI));
+        let turned = run(frame, 1.0);
+        assert!(distance(frame.compose(&path), turned) < 1e-9, "{k}: {path:?} {turned:?}");
+    }
 }
 
 #[test]

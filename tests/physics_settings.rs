@@ -252,20 +252,24 @@ fn a_pushed_carton_costs_its_friction() {
     assert!((plant.body_poses()[0].x - 1.0).abs() < 0.005 && plant.truth().x < 0.64, "{:?}", plant.body_poses()[0]);
 }
 
-/// A carton in a corner keeps rapier at work in every substep; far from everything, the path is the same bit by bit.
+/// Rapier at work in every substep, needed or not: far from everything, the path is the same bit by bit. So it is with a carton
+/// in a corner.
 #[test]
 fn leaving_rapier_out_in_free_motion_changes_no_bit() {
     let far = "[[obstacles]]\nname = \"carton\"\nshape = { disc = { radius_m = 0.2 } }\nposition_m = [-3.5, -3.5]\n\
                height_m = 0.5\ntexture = { family = \"plain\" }\nmotion = { pushed = { mass_kg = 1.0 } }";
-    let run = |more: &str| {
-        let mut plant = RapierPlant::new(&world("", more), Pose::new(0.3, -0.2, 0.4), Seed(1));
+    let plant = |more: &str| RapierPlant::new(&world("", more), Pose::new(0.3, -0.2, 0.4), Seed(1));
+    let run = |mut plant: RapierPlant| {
         let steps: Vec<_> = [(0.3, 0.5), (0.1, -1.0), (0.3, 0.0), (-0.2, 0.8)]
             .into_iter()
             .map(|(v, omega)| plant.step(Twist { v, omega }, 2.0))
             .collect();
         (plant.truth(), steps)
     };
-    assert_eq!(run(""), run(far));
+    let alone = run(plant(""));
+    assert_eq!(alone, run(plant("").always_asking_rapier()));
+    assert_eq!(alone, run(plant(far)));
+    assert_eq!(alone, run(plant(far).always_asking_rapier()));
 }
 
 #[test]

@@ -7,7 +7,8 @@ use serde::Serialize;
 use wayhome::episode::Setup;
 use wayhome::episode::open_loop::{Commands, DriveSummary, drive};
 use wayhome::random::Seed;
-use wayhome::report::{OutputFolder, drive as drive_report, text};
+use wayhome::report::drive::{DriveFiles, FILES};
+use wayhome::report::{OutputFolder, text};
 use wayhome::world::World;
 
 use super::Verdict;
@@ -31,16 +32,17 @@ pub fn run(args: &DriveArgs, context: &Context) -> Result<Verdict> {
     };
     let seed = args.seed.to_string();
     let out = args.out.clone().unwrap_or_else(|| default_folder(&["drive", &world.spec.name, &seed]));
-    let folder = OutputFolder::open(&out, "drive", drive_report::FILES)?;
+    let folder = OutputFolder::open(&out, "drive", FILES)?;
     let bar = context.progress(None)?;
-    let record = drive(&world, start, Seed(args.seed), &commands, &mut |step| {
+    let mut files = DriveFiles::begin(folder, &world)?;
+    let summary = drive(&world, start, Seed(args.seed), &commands, &mut |step, collisions| {
+        files.add(step, collisions)?;
         bar.set_message(format!("{:.1} s", step.time_s));
         bar.tick();
-        if context.is_stopped() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        Ok(if context.is_stopped() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) })
     })?;
     bar.finish_and_clear();
-    let summary = DriveSummary::new(&record, &world, &commands, args.seed);
-    drive_report::write(folder, &world, &record, &summary)?;
+    files.finish(&summary)?;
     let output = Output { summary: &summary, out: out.display().to_string() };
     context.print(&output, || text::drive(&summary, &out))?;
     Ok(Verdict::Done)

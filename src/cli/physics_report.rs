@@ -27,14 +27,15 @@ struct Form {
 
 pub fn run(args: &PhysicsReportArgs, context: &Context) -> Result<Verdict> {
     let folder = OutputFolder::open(&args.out, "physics-report", physics_report::FILES)?;
-    // What another engine made of the same drives is kept and shown.
-    let outside = std::fs::read_to_string(args.out.join(physics_report::OUTSIDE)).ok();
+    // What another engine made of the same drives and what the benchmark measured is kept and shown.
+    let kept = |name: &str| std::fs::read_to_string(args.out.join(name)).ok();
     let findings = physics_report::Findings {
         closed_forms: physics::closed_forms()?,
         energy: physics::energy(),
         convergence: physics::convergence()?,
         slip_map: physics::slip_map()?,
-        outside,
+        outside: kept(physics_report::OUTSIDE),
+        speed: kept(physics_report::SPEED),
     };
     physics_report::write(folder, &findings)?;
     let forms = findings.closed_forms.iter().map(|f| Form {

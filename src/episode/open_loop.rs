@@ -1,7 +1,7 @@
 //! Open loop: a table of commands drives the robot, and nobody looks where it goes.
 //!
-//! [`Commands`] is the table, checked as a whole before anything moves. [`drive`] runs it on a [`RapierPlant`] and keeps truth,
-//! odometry, wheels and floor contacts side by side in a [`DriveRecord`]; [`DriveSummary`] is that in numbers.
+//! [`Commands`] is the table, checked as a whole before anything moves. [`drive`] runs it on a [`RapierPlant`] and hands on truth,
+//! odometry, wheels and floor contacts side by side, a [`DriveStep`] at a time; [`DriveSummary`] is that in numbers.
 
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -20,8 +20,10 @@ use crate::world::World;
 const COLUMNS: [&str; 3] = ["t_s", "v_m_s", "omega_rad_s"];
 /// Least time between two rows, s: a substep of the physics.
 const LEAST_INTERVAL_S: f64 = 1e-3;
-/// Most control steps of a table: each is kept until the end.
-const MOST_STEPS: f64 = 1e6;
+/// Most control steps of a table: a row of 0.5 kB each.
+const MOST_STEPS: f64 = 1e8;
+/// Most collisions that a summary lists.
+const MOST_LISTED: usize = 1000;
 /// Greatest speed and turn rate that a table may ask for; what the robot's limits make of it is the robot's business.
 const GREATEST_COMMAND: f64 = 1e3;
 
@@ -147,35 +149,16 @@ pub struct DriveStep {
     pub collisions: u32,
 }
 
-/// A drive from its start to its end.
-#[derive(Debug, Clone)]
-pub struct DriveRecord {
-    /// States, from the start on. Never empty.
-    pub steps: Vec<DriveStep>,
-    /// Collisions as they began.
-    pub collisions: Vec<Collision>,
-}
-
-impl DriveRecord {
-    /// The state at the end.
-    #[must_use]
-    pub fn last(&self) -> &DriveStep {
-        &self.steps[self.steps.len() - 1]
-    }
-}
+/// Is shown each state of a drive with the collisions that led to it, and says whether to go on.
+pub type Watch<'a> = dyn FnMut(&DriveStep, &[Collision]) -> Result<ControlFlow<()>> + 'a;
 
 /// Drives `commands` from `start` in `world`, with a state at least every control period of the world's task. `watch` is called
-/// with each state and stops the drive with `Break`.
+/// with each state, the one at the start included, and the collisions that led to it; it stops the drive with `Break`. Nothing is
+/// kept but what the summary needs, so that a drive may last as long as it likes.
 ///
 /// # Errors
-/// [`Error::Invalid`] when the table is too long to be kept, [`Error::Interrupted`] when `watch` breaks.
-pub fn drive(
-    world: &World,
-    start: Pose,
-    seed: Seed,
-    commands: &Commands,
-    watch: &mut dyn FnMut(&DriveStep) -> ControlFlow<()>,
-) -> Result<DriveRecord> {
+/// [`Error::Invalid`] when the table is too long for any disk, [`Error::Interrupted`] when `watch` breaks, and what it fails with.
+pub fn drive(world: &World, start: Pose, seed: Seed, commands: &Commands, watch: &mut Watch<'_>) -> Result<DriveSummary> {
     let period_s = world.spec.task.control_period_s;
     if commands.duration_s() / period_s + commands.rows.len() as f64 > MOST_STEPS {
         return Err(Error::Invalid {
@@ -185,7 +168,7 @@ pub fn drive(
         });
     }
     let mut plant = RapierPlant::new(world, start, seed);
-    let first = DriveStep {
+    let mut last = DriveStep {
         time_s: 0.0,
         command: Twist::default(),
         truth: start,
@@ -197,7 +180,12 @@ pub fn drive(
         floor: FloorContact { load_n: plant.chassis().loads(), ..FloorContact::default() },
         collisions: 0,
     };
-    let mut record = DriveRecord { steps: vec![first], collisions: Vec::new() };
+    let mut summary = DriveSummary::new(&last, world, commands, seed);
+    let mut watch = |step: &DriveStep, collisions: &[Collision]| match watch(step, collisions)? {
+        ControlFlow::Break(()) => Err(Error::Interrupted),
+        ControlFlow::Continue(()) => Ok(()),
+    };
+    watch(&last, &[])?;
     for (time_s, length_s, command) in commands.intervals(period_s) {
         let moved = plant.step(command, length_s);
         let chassis = plant.chassis();
@@ -207,19 +195,17 @@ pub fn drive(
             truth: plant.truth(),
             velocity_m_s: chassis.axle_velocity(),
             yaw_rate_rad_s: chassis.velocity().yaw_rate,
-            dead_reckoned: record.last().dead_reckoned.advanced(moved.odometry.twist, moved.odometry.dt_s),
+            dead_reckoned: last.dead_reckoned.advanced(moved.odometry.twist, moved.odometry.dt_s),
             odometry: moved.odometry.twist,
             wheel_speeds_rad_s: chassis.wheel_speeds(),
             floor: *plant.floor_contact(),
             collisions: moved.collisions,
         };
-        record.collisions.extend_from_slice(plant.collisions());
-        record.steps.push(step);
-        if watch(&step).is_break() {
-            return Err(Error::Interrupted);
-        }
+        summary.add(&last, &step, plant.collisions(), world);
+        watch(&step, plant.collisions())?;
+        last = step;
     }
-    Ok(record)
+    Ok(summary)
 }
 
 /// A drive in numbers. Depends on the world, the commands, the start and the seed alone.
@@ -245,7 +231,7 @@ pub struct DriveSummary {
     pub greatest_slip_m_s: f64,
     /// Contacts with walls and bodies.
     pub collisions: usize,
-    /// Each of them.
+    /// The first thousand of them.
     pub collision_list: Vec<CollisionRecord>,
     /// Seed of the run.
     pub seed: u64,
@@ -260,29 +246,42 @@ pub struct DriveSummary {
 }
 
 impl DriveSummary {
-    /// What a drive came to.
-    #[must_use]
-    pub fn new(record: &DriveRecord, world: &World, commands: &Commands, seed: u64) -> Self {
-        let (start, end) = (&record.steps[0], record.last());
-        let greatest = |of: &dyn Fn(&DriveStep) -> f64| record.steps.iter().map(of).fold(0.0, f64::max);
+    /// A drive that has not begun.
+    fn new(start: &DriveStep, world: &World, commands: &Commands, seed: Seed) -> Self {
         Self {
-            time_s: end.time_s,
+            time_s: 0.0,
             start: start.truth.into(),
-            end: end.truth.into(),
-            odometry_end: end.dead_reckoned.into(),
-            odometry_drift_m: (end.dead_reckoned.position() - end.truth.position()).norm(),
-            odometry_heading_drift_rad: wrap(end.dead_reckoned.heading - end.truth.heading),
-            path_length_m: record.steps.windows(2).map(|w| (w[1].truth.position() - w[0].truth.position()).norm()).sum(),
-            greatest_speed_m_s: greatest(&|s| s.velocity_m_s.norm()),
-            greatest_slip_m_s: greatest(&|s| s.floor.slip_m_s[0].norm().max(s.floor.slip_m_s[1].norm())),
-            collisions: record.collisions.len(),
-            collision_list: CollisionRecord::list(&record.collisions, world),
-            seed,
+            end: start.truth.into(),
+            odometry_end: start.dead_reckoned.into(),
+            odometry_drift_m: 0.0,
+            odometry_heading_drift_rad: 0.0,
+            path_length_m: 0.0,
+            greatest_speed_m_s: 0.0,
+            greatest_slip_m_s: 0.0,
+            collisions: 0,
+            collision_list: Vec::new(),
+            seed: seed.0,
             world: world.spec.name.clone(),
             world_sha256: world.sha256.clone(),
             commands_sha256: commands.sha256.clone(),
             version: env!("CARGO_PKG_VERSION"),
         }
+    }
+
+    /// The drive has gone on to `step`.
+    fn add(&mut self, before: &DriveStep, step: &DriveStep, collisions: &[Collision], world: &World) {
+        let [left, right] = step.floor.slip_m_s;
+        self.time_s = step.time_s;
+        self.end = step.truth.into();
+        self.odometry_end = step.dead_reckoned.into();
+        self.odometry_drift_m = (step.dead_reckoned.position() - step.truth.position()).norm();
+        self.odometry_heading_drift_rad = wrap(step.dead_reckoned.heading - step.truth.heading);
+        self.path_length_m += (step.truth.position() - before.truth.position()).norm();
+        self.greatest_speed_m_s = self.greatest_speed_m_s.max(step.velocity_m_s.norm());
+        self.greatest_slip_m_s = self.greatest_slip_m_s.max(left.norm()).max(right.norm());
+        self.collisions += collisions.len();
+        let listed = collisions.len().min(MOST_LISTED - self.collision_list.len());
+        self.collision_list.extend(CollisionRecord::list(&collisions[..listed], world));
     }
 }
 

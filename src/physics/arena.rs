@@ -1,26 +1,23 @@
-//! The room in rapier: walls, bodies and the robot's round body, and what happens where they touch.
+//! The room in rapier, with walls, bodies and the robot's round body: what happens where bodies that can be pushed take part.
 //!
 //! The only file that knows rapier and its vector types. Rapier's world is a top view, so it has no gravity; friction with
 //! the floor is not its business (see `chassis`). Everything crosses this border in f64.
 
 use rapier2d::prelude::{
-    ColliderBuilder, ColliderHandle, MassProperties, PhysicsWorld, Pose as RapierPose, RigidBodyBuilder, RigidBodyHandle,
-    Rotation, Vector,
+    ColliderBuilder, ColliderHandle, ContactPair, MassProperties, PhysicsWorld, Pose as RapierPose, RigidBody,
+    RigidBodyBuilder, RigidBodyHandle, Rotation, Vector,
 };
 
-use super::Struck;
 use super::chassis::PlanarVelocity;
+use super::hull::{HULL_FRICTION, HULL_RESTITUTION};
 use super::movers::is_solid;
 use super::polygon::{contains, edges, segments_cross};
 use super::slide::SlidingBody;
+use super::{Struck, Touched};
 use crate::geometry::{Pose, Vector2, atan2, sin_cos};
 use crate::world::{Footprint, MotionSpec, World};
 
-/// Coulomb friction of the robot's hull on walls and bodies.
-const HULL_FRICTION: f32 = 0.3;
-/// Share of the speed of approach that a hit gives back.
-const HULL_RESTITUTION: f32 = 0.1;
-/// Size of what moves, m. Rapier's tolerances scale with it: contacts may sink in by 0.5 mm and are foreseen at 2 mm.
+/// Size of what moves, m. Rapier's tolerances scale with it: contacts may sink in by 0.5 mm and are foreseen at `TOUCH_GAP_M`.
 const LENGTH_UNIT_M: f32 = 0.1;
 /// Depth of a wall behind its face, m, where the room leaves space for it.
 const WALL_DEPTH_M: f64 = 0.5;
@@ -36,15 +33,6 @@ pub(super) struct Touch {
     pub(super) velocity: PlanarVelocity,
 }
 
-/// Outcome of a substep.
-#[derive(Debug, Clone)]
-pub(super) struct ArenaStep {
-    /// Rapier's motion, where the robot was within 2 mm of something; nothing where it was free.
-    pub(super) touch: Option<Touch>,
-    /// Contacts that began: with what, and their impulse so far, N s.
-    pub(super) began: Vec<(Struck, f64)>,
-}
-
 /// A body that can be pushed.
 struct Loose {
     /// Its index in the world.
@@ -53,17 +41,26 @@ struct Loose {
     slide: SlidingBody,
 }
 
+/// A body that moves by itself and that the robot can run into.
+struct Led {
+    /// Its index in the world.
+    index: usize,
+    handle: RigidBodyHandle,
+    /// Whether rapier knows of it now.
+    present: bool,
+}
+
 /// Rapier's copy of the room.
 pub(super) struct Arena {
     physics: PhysicsWorld,
     robot: RigidBodyHandle,
     hull: ColliderHandle,
-    /// Bodies that move by themselves and that the robot can run into, with their index in the world.
-    movers: Vec<(usize, RigidBodyHandle)>,
+    /// Bodies that move by themselves and that the robot can run into.
+    movers: Vec<Led>,
     /// Bodies that can be pushed.
     loose: Vec<Loose>,
-    /// What the robot touches now.
-    touching: Vec<ColliderHandle>,
+    /// Whether friction holds all of those still.
+    settled: bool,
 }
 
 impl Arena {
@@ -75,7 +72,8 @@ impl Arena {
         // At a millisecond a step, rapier's four inner steps per step add cost and no accuracy.
         physics.integration_parameters.num_solver_iterations = 1;
 
-        let hard = |shape: ColliderBuilder| shape.friction(HULL_FRICTION).restitution(HULL_RESTITUTION).density(0.0);
+        let (friction, restitution) = (HULL_FRICTION as f32, HULL_RESTITUTION as f32);
+        let hard = |shape: ColliderBuilder| shape.friction(friction).restitution(restitution).density(0.0);
         for (k, [a, b, apex]) in walls(&world.outline).enumerate() {
             let wall = hard(ColliderBuilder::triangle(vector(a), vector(b), vector(apex)));
             physics.insert_collider(wall.user_data(mark(Struck::Wall(k))), None);
@@ -90,8 +88,8 @@ impl Arena {
                 let handle = physics.insert(dynamic, shape.mass(mass_kg as f32)).0;
                 loose.push(Loose { index, handle, slide: SlidingBody::new(&body.footprint, friction) });
             } else if body.motion.is_some() {
-                let kinematic = RigidBodyBuilder::kinematic_position_based().pose(rapier_pose(&body.pose)).can_sleep(false);
-                movers.push((index, physics.insert(kinematic, shape).0));
+                let kinematic = RigidBodyBuilder::kinematic_position_based().can_sleep(false).enabled(false);
+                movers.push(Led { index, handle: physics.insert(kinematic, shape).0, present: false });
             } else {
                 physics.insert_collider(shape.position(rapier_pose(&body.pose)), None);
             }
@@ -101,30 +99,57 @@ impl Arena {
         let body =
             RigidBodyBuilder::dynamic().pose(rapier_pose(&start)).additional_mass_properties(mass).can_sleep(false).build();
         let (robot, hull) = physics.insert(body, hard(ColliderBuilder::ball(robot_spec.radius_m as f32)));
-        Self { physics, robot, hull, movers, loose, touching: Vec::new() }
+        Self { physics, robot, hull, movers, loose, settled: true }
     }
 
-    /// Takes over where the moving bodies are, after substeps without rapier, in which the robot touched nothing.
-    pub(super) fn resume(&mut self, poses: &[Pose]) {
-        for &(index, handle) in &self.movers {
-            if let Some(body) = self.physics.bodies.get_mut(handle) {
-                body.set_position(rapier_pose(&poses[index]), false);
+    /// After substeps without rapier, what it knows of bodies that move by themselves is out of date.
+    pub(super) fn resume(&mut self) {
+        for mover in self.movers.iter_mut().filter(|mover| mover.present) {
+            mover.present = false;
+            if let Some(body) = self.physics.bodies.get_mut(mover.handle) {
+                body.set_enabled(false);
             }
         }
-        self.touching.clear();
     }
 
-    /// Where each moving body will be at the end of the next substep.
+    /// Lets those moving bodies take part for which `reaches` holds (by their index in the world), from where `poses` has them.
+    pub(super) fn admit_bodies(&mut self, poses: &[Pose], reaches: impl Fn(usize) -> bool) {
+        for mover in &mut self.movers {
+            let wanted = reaches(mover.index);
+            if wanted == mover.present {
+                continue;
+            }
+            mover.present = wanted;
+            if let Some(body) = self.physics.bodies.get_mut(mover.handle) {
+                body.set_enabled(wanted);
+                body.set_position(rapier_pose(&poses[mover.index]), false);
+            }
+        }
+    }
+
+    /// Where each moving body that takes part will be at the end of the next substep.
     pub(super) fn lead_bodies(&mut self, poses: &[Pose]) {
-        for &(index, handle) in &self.movers {
-            if let Some(body) = self.physics.bodies.get_mut(handle) {
-                body.set_next_kinematic_position(rapier_pose(&poses[index]));
+        for mover in self.movers.iter().filter(|mover| mover.present) {
+            if let Some(body) = self.physics.bodies.get_mut(mover.handle) {
+                body.set_next_kinematic_position(rapier_pose(&poses[mover.index]));
             }
         }
     }
 
-    /// Steps `dt` seconds with the robot's axle at `pose` and its centre of gravity at `velocity`.
-    pub(super) fn step(&mut self, pose: &Pose, velocity: &PlanarVelocity, dt: f64) -> ArenaStep {
+    /// Whether the bodies that can be pushed stand still, and would go on doing so if nothing touched them.
+    pub(super) fn settled(&self) -> bool {
+        self.settled
+    }
+
+    /// Steps `dt` seconds with the robot's axle at `pose` and its centre of gravity at `velocity`. What the robot touches or comes
+    /// close to goes to `touched`; with nothing there, rapier has no say in its motion and none comes back.
+    pub(super) fn step(
+        &mut self,
+        pose: &Pose,
+        velocity: &PlanarVelocity,
+        dt: f64,
+        touched: &mut Vec<Touched>,
+    ) -> Option<Touch> {
         let before = rapier_pose(pose);
         if let Some(robot) = self.physics.bodies.get_mut(self.robot) {
             robot.set_position(before, false);
@@ -133,26 +158,36 @@ impl Arena {
         }
         for loose in &self.loose {
             if let Some(body) = self.physics.bodies.get_mut(loose.handle) {
-                let velocity = PlanarVelocity { linear: from_vector(body.linvel()), yaw_rate: f64::from(body.angvel()) };
-                let slowed = loose.slide.slowed(&velocity, dt);
+                let slowed = loose.slide.slowed(&velocity_of(body), dt);
                 body.set_linvel(vector(slowed.linear), false);
                 body.set_angvel(slowed.yaw_rate as f32, false);
             }
         }
         self.physics.integration_parameters.dt = dt as f32;
         self.physics.step();
-
-        let (near, began) = self.watch_contacts();
-        let touch = near.then(|| self.physics.bodies.get(self.robot)).flatten().map(|robot| {
-            let after = robot.position();
-            let turn = before.rotation.inverse() * after.rotation;
-            Touch {
-                displacement: from_vector(after.translation - before.translation),
-                turn: atan2(f64::from(turn.im), f64::from(turn.re)),
-                velocity: PlanarVelocity { linear: from_vector(robot.linvel()), yaw_rate: f64::from(robot.angvel()) },
-            }
+        self.settled = self.loose.iter().all(|loose| {
+            let velocity = self.physics.bodies.get(loose.handle).map(velocity_of).unwrap_or_default();
+            loose.slide.slowed(&velocity, dt) == PlanarVelocity::default()
         });
-        ArenaStep { touch, began }
+
+        let pairs = self.physics.narrow_phase.contact_pairs_with(self.hull).filter(|pair| pair.has_any_active_contact());
+        let first = touched.len();
+        touched.extend(pairs.map(|pair| {
+            let other = if pair.collider1 == self.hull { pair.collider2 } else { pair.collider1 };
+            let mark = self.physics.colliders.get(other).map_or(0, |collider| collider.user_data);
+            Touched { with: struck(mark), impulse_n_s: impulse(pair) }
+        }));
+        if touched.len() == first {
+            return None;
+        }
+        let robot = self.physics.bodies.get(self.robot)?;
+        let after = robot.position();
+        let turn = before.rotation.inverse() * after.rotation;
+        Some(Touch {
+            displacement: from_vector(after.translation - before.translation),
+            turn: atan2(f64::from(turn.im), f64::from(turn.re)),
+            velocity: velocity_of(robot),
+        })
     }
 
     /// Where the bodies that can be pushed are now, by their index in the world.
@@ -164,31 +199,15 @@ impl Arena {
             Some((loose.index, Pose::new(position.x, position.y, heading)))
         })
     }
+}
 
-    /// Whether the robot is close to anything, and which contacts began. A contact begins when it first carries an
-    /// impulse and ends when the gap has grown beyond what rapier foresees, so that a robot that rattles along a wall counts
-    /// once.
-    fn watch_contacts(&mut self) -> (bool, Vec<(Struck, f64)>) {
-        let mut near = Vec::new();
-        let mut began = Vec::new();
-        for pair in self.physics.narrow_phase.contact_pairs_with(self.hull) {
-            if !pair.has_any_active_contact() {
-                continue;
-            }
-            let other = if pair.collider1 == self.hull { pair.collider2 } else { pair.collider1 };
-            let known = self.touching.contains(&other);
-            let impulse = pair.total_impulse_magnitude();
-            let touches = known || impulse > 0.0;
-            near.push((other, touches));
-            if touches && !known {
-                let mark = self.physics.colliders.get(other).map_or(0, |collider| collider.user_data);
-                began.push((struck(mark), f64::from(impulse)));
-            }
-        }
-        self.touching.clear();
-        self.touching.extend(near.iter().filter(|(_, touches)| *touches).map(|(other, _)| *other));
-        (!near.is_empty(), began)
-    }
+/// Impulse of a contact, N s, friction included.
+fn impulse(pair: &ContactPair) -> f64 {
+    let points = pair.solver_manifolds().iter().flat_map(|manifold| &manifold.points);
+    let [normal, along] = points.fold([0.0, 0.0], |[normal, along], point| {
+        [normal + f64::from(point.data.impulse), along + f64::from(point.data.tangent_impulse[0])]
+    });
+    (normal * normal + along * along).sqrt()
 }
 
 /// What a collider stands for, as the number that rapier carries for us: walls are even, bodies odd.
@@ -238,6 +257,10 @@ fn shape(footprint: &Footprint) -> ColliderBuilder {
             ColliderBuilder::convex_hull(&corners).unwrap_or_else(|| ColliderBuilder::polyline(corners, None))
         }
     }
+}
+
+fn velocity_of(body: &RigidBody) -> PlanarVelocity {
+    PlanarVelocity { linear: from_vector(body.linvel()), yaw_rate: f64::from(body.angvel()) }
 }
 
 fn vector(v: Vector2<f64>) -> Vector {

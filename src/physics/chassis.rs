@@ -359,9 +359,21 @@ impl Chassis {
         self.turned += angle;
     }
 
+    /// The centre of gravity in the room, m.
+    pub(super) fn centre_of_gravity(&self) -> Vector2<f64> {
+        self.position
+    }
+
+    /// Ends a substep whose kick contact turned into `velocity`: moves with it for `dt` seconds, and by `out` besides.
+    pub(super) fn rebound(&mut self, velocity: PlanarVelocity, out: Vector2<f64>, dt: f64) {
+        self.velocity = velocity;
+        self.position += velocity.linear * dt + out;
+        self.turn_by(velocity.yaw_rate * dt);
+    }
+
     /// Takes over what contact with a wall or body made of the substep: the displacement of the axle's middle, the change of
     /// heading, and the velocity.
-    pub fn adopt(&mut self, displacement: Vector2<f64>, turn: f64, velocity: PlanarVelocity) {
+    pub(super) fn adopt(&mut self, displacement: Vector2<f64>, turn: f64, velocity: PlanarVelocity) {
         let axle = self.pose().position() + displacement;
         self.turn_by(turn);
         let (s, c) = sin_cos(self.heading);

@@ -16,12 +16,17 @@ pub(super) fn contains(corners: &[Vector2<f64>], point: Vector2<f64>) -> bool {
     })
 }
 
-/// Distance from `point` to the segment from `a` to `b`.
-pub(super) fn distance_to_segment(point: Vector2<f64>, a: Vector2<f64>, b: Vector2<f64>) -> f64 {
+/// The point of the segment from `a` to `b` that is closest to `point`, and its share of the way, 0 to 1.
+pub(super) fn closest_on_segment(point: Vector2<f64>, a: Vector2<f64>, b: Vector2<f64>) -> (Vector2<f64>, f64) {
     let along = b - a;
     let length_squared = along.norm_squared();
     let t = if length_squared > 0.0 { ((point - a).dot(&along) / length_squared).clamp(0.0, 1.0) } else { 0.0 };
-    (a + along * t - point).norm()
+    (a + along * t, t)
+}
+
+/// Distance from `point` to the segment from `a` to `b`.
+pub(super) fn distance_to_segment(point: Vector2<f64>, a: Vector2<f64>, b: Vector2<f64>) -> f64 {
+    (closest_on_segment(point, a, b).0 - point).norm()
 }
 
 /// Distance from `point`, given in the footprint's frame, to the footprint; zero inside.
@@ -32,6 +37,14 @@ pub(super) fn distance_to_footprint(footprint: &Footprint, point: Vector2<f64>) 
         Footprint::Polygon(corners) => {
             edges(corners).map(|(a, b)| distance_to_segment(point, a, b)).fold(f64::INFINITY, f64::min)
         }
+    }
+}
+
+/// Radius of the circle around the footprint's origin that holds all of it.
+pub(super) fn bounding_radius(footprint: &Footprint) -> f64 {
+    match footprint {
+        Footprint::Disc(radius) => *radius,
+        Footprint::Polygon(corners) => corners.iter().map(Vector2::norm).fold(0.0, f64::max),
     }
 }
 

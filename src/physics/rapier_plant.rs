@@ -4,12 +4,13 @@ use super::arena::Arena;
 use super::chassis::{Chassis, PlanarVelocity};
 use super::drive::{CommandLimiter, Encoders};
 use super::gyro::Gyro;
+use super::hull::Hull;
 use super::motor::WheelDrive;
 use super::movers::{Movers, Walkway};
 use super::polygon::contains;
 use super::script::{Event, Script};
-use super::vicinity::Vicinity;
-use super::{Collision, Plant, PlantStep};
+use super::vicinity::{Near, Scene, Vicinity};
+use super::{Collision, Plant, PlantStep, Struck, Touched};
 use crate::geometry::{Pose, Twist, Vector2};
 use crate::random::Seed;
 use crate::world::robot::WheelFault;
@@ -35,10 +36,18 @@ pub struct RapierPlant {
     seized: [bool; 2],
     floor: Floor,
     movers: Movers,
+    hull: Hull,
     arena: Arena,
     vicinity: Vicinity,
-    /// Whether rapier took part in the last substep.
-    near: bool,
+    /// What had a say in the last substep.
+    near: Near,
+    /// Whether rapier takes part in each, needed or not.
+    always_ask_rapier: bool,
+    /// Where bodies were at the start of the substep.
+    before: Vec<Pose>,
+    /// What the robot came close to in the last substep, and what it is in contact with.
+    touched: Vec<Touched>,
+    touching: Vec<Struck>,
     radius: f64,
     substep_s: f64,
     /// Time since the start, s.
@@ -63,13 +72,14 @@ pub struct FloorContact {
 }
 
 impl RapierPlant {
-    /// A robot at rest in `world` with the middle of its axle at `start`, which should be clear of walls and bodies: rapier
-    /// pushes an overlapping robot out, in whichever direction is shortest.
+    /// A robot at rest in `world` with the middle of its axle at `start`, which should be clear of walls and bodies: an
+    /// overlapping robot is pushed out, in whichever direction is shortest.
     #[must_use]
     pub fn new(world: &World, start: Pose, seed: Seed) -> Self {
         let robot = &world.spec.robot;
         let chassis = Chassis::new(robot, start);
         Self {
+            hull: Hull::new(world),
             arena: Arena::new(world, start, chassis.yaw_inertia()),
             chassis,
             limiter: CommandLimiter::new(robot),
@@ -80,7 +90,11 @@ impl RapierPlant {
             floor: Floor { friction: world.spec.floor.friction, zones: world.zones.clone() },
             movers: Movers::new(world, seed),
             vicinity: Vicinity::new(world, start.position()),
-            near: false,
+            near: Near::Nothing,
+            always_ask_rapier: false,
+            before: Vec::new(),
+            touched: Vec::new(),
+            touching: Vec::new(),
             radius: robot.radius_m,
             substep_s: SUBSTEP_S,
             clock_s: 0.0,
@@ -93,6 +107,14 @@ impl RapierPlant {
     #[must_use]
     pub fn with_substep(mut self, substep_s: f64) -> Self {
         self.substep_s = substep_s.clamp(1e-6, 1e-2);
+        self
+    }
+
+    /// The same plant with rapier at work in every substep, not only where something can be pushed: for tests, which hold the two
+    /// ways against each other, and to measure what rapier costs.
+    #[must_use]
+    pub fn always_asking_rapier(mut self) -> Self {
+        self.always_ask_rapier = true;
         self
     }
 
@@ -120,26 +142,54 @@ impl RapierPlant {
         self.chassis.kick(drives, |point| self.floor.friction_at(point), dt);
 
         let (pose, velocity) = (self.chassis.pose(), self.chassis.velocity());
-        let near = !self.vicinity.is_clear(pose.position(), velocity.linear.norm(), self.movers.poses(), dt);
-        if near && !self.near {
-            self.arena.resume(self.movers.poses());
+        let scene = Scene { robot: pose.position(), speed: velocity.linear.norm(), poses: self.movers.poses(), dt };
+        let near = if self.always_ask_rapier { Near::Loose } else { self.vicinity.look(&scene, self.arena.settled()) };
+        if near == Near::Loose {
+            if self.near != Near::Loose {
+                self.arena.resume();
+            }
+            self.arena.admit_bodies(scene.poses, |body| self.vicinity.reaches(body, &scene));
         }
         self.near = near;
-        self.movers.advance(Walkway { robot: pose.position(), radius: self.radius }, dt);
-        if !near {
-            return self.chassis.drift(dt);
+        let walkway = Walkway { robot: pose.position(), radius: self.radius };
+        self.touched.clear();
+        match near {
+            Near::Nothing => {
+                self.movers.advance(walkway, dt);
+                self.chassis.drift(dt);
+            }
+            Near::Unyielding => {
+                self.before.clear();
+                self.before.extend_from_slice(self.movers.poses());
+                self.movers.advance(walkway, dt);
+                self.hull.advance(&mut self.chassis, &self.before, self.movers.poses(), dt, &mut self.touched);
+            }
+            Near::Loose => {
+                self.movers.advance(walkway, dt);
+                self.arena.lead_bodies(self.movers.poses());
+                match self.arena.step(&pose, &velocity, dt, &mut self.touched) {
+                    Some(touch) => self.chassis.adopt(touch.displacement, touch.turn, touch.velocity),
+                    None => self.chassis.drift(dt),
+                }
+                for (index, pose) in self.arena.loose_poses() {
+                    self.movers.place(index, pose);
+                }
+            }
         }
-        self.arena.lead_bodies(self.movers.poses());
-        let outcome = self.arena.step(&pose, &velocity, dt);
-        match outcome.touch {
-            Some(touch) => self.chassis.adopt(touch.displacement, touch.turn, touch.velocity),
-            None => self.chassis.drift(dt),
+        self.watch_contacts(time_s + dt);
+    }
+
+    /// Reports the contacts that began. A contact begins when it first carries an impulse and ends when the gap has grown beyond
+    /// [`super::TOUCH_GAP_M`], so that a robot that rattles along a wall counts once.
+    fn watch_contacts(&mut self, time_s: f64) {
+        let touching = &mut self.touching;
+        touching.retain(|known| self.touched.iter().any(|touched| touched.with == *known));
+        for &Touched { with, impulse_n_s } in self.touched.iter().filter(|touched| touched.impulse_n_s > 0.0) {
+            if !touching.contains(&with) {
+                touching.push(with);
+                self.collisions.push(Collision { time_s, with, impulse_n_s });
+            }
         }
-        for (index, pose) in self.arena.loose_poses() {
-            self.movers.place(index, pose);
-        }
-        let hit = |(with, impulse_n_s)| Collision { time_s: time_s + dt, with, impulse_n_s };
-        self.collisions.extend(outcome.began.into_iter().map(hit));
     }
 
     fn suffer(&mut self, event: Event) {

@@ -1,12 +1,15 @@
 //! The files of one open-loop drive.
 
-use super::{OutputFolder, json};
-use crate::episode::open_loop::{DriveRecord, DriveStep, DriveSummary};
+use super::map::{MapDrawing, PathStyle};
+use super::{GrowingFile, OutputFolder, json};
+use crate::episode::open_loop::{DriveStep, DriveSummary};
 use crate::error::Result;
+use crate::geometry::{Pose, Vector2};
+use crate::physics::Collision;
 use crate::world::World;
 
 /// Names of all files of a drive.
-pub const FILES: &[&str] = &["summary.json", "drive.csv", "path.svg"];
+pub const FILES: &[&str] = &["summary.json", "drive.csv", "collisions.csv", "path.svg"];
 
 /// Columns of `drive.csv`. Slip, forces and loads are means over the interval that ends at the row's time, in the robot's frame;
 /// everything else is as of that time.
@@ -46,28 +49,111 @@ const COLUMNS: [&str; 33] = [
     "odometry_error_m",
 ];
 
-/// Writes all files of a drive.
-///
-/// # Errors
-/// When a file cannot be written.
-pub fn write(mut folder: OutputFolder, world: &World, record: &DriveRecord, summary: &DriveSummary) -> Result<()> {
-    folder.write("drive.csv", drive_csv(&record.steps).as_bytes())?;
-    folder.write("path.svg", path_svg(world, record).as_bytes())?;
-    // Last, so that a folder with a summary is complete.
-    folder.write("summary.json", json(summary).as_bytes())?;
-    folder.finish()
+/// The files of a drive under way: rows go to disk as they come, and of the paths only what a drawing can show is kept.
+pub struct DriveFiles<'a> {
+    folder: OutputFolder,
+    world: &'a World,
+    rows: GrowingFile,
+    collisions: GrowingFile,
+    truth: Trail,
+    odometry: Trail,
+    /// Poses at the start and now.
+    ends: Option<(Pose, Pose)>,
 }
 
-/// One row a state. Numbers have as many digits as it takes to read them back without loss.
-#[must_use]
-pub fn drive_csv(steps: &[DriveStep]) -> String {
-    let mut text = COLUMNS.join(",");
-    text.push('\n');
-    for step in steps {
-        text.push_str(&row(step).map(|value| value.to_string()).join(","));
-        text.push('\n');
+impl<'a> DriveFiles<'a> {
+    /// Begins the files in `folder`, which was opened for [`FILES`].
+    ///
+    /// # Errors
+    /// When a file cannot be created.
+    pub fn begin(folder: OutputFolder, world: &'a World) -> Result<Self> {
+        let mut rows = folder.begin("drive.csv")?;
+        rows.append(&format!("{}\n", COLUMNS.join(",")))?;
+        let mut collisions = folder.begin("collisions.csv")?;
+        collisions.append("t_s,with,impulse_n_s\n")?;
+        Ok(Self { folder, world, rows, collisions, truth: Trail::default(), odometry: Trail::default(), ends: None })
     }
-    text
+
+    /// Adds a state and the collisions that led to it. Numbers have as many digits as it takes to read them back without loss.
+    ///
+    /// # Errors
+    /// When a file cannot be written.
+    pub fn add(&mut self, step: &DriveStep, collisions: &[Collision]) -> Result<()> {
+        self.rows.append(&format!("{}\n", row(step).map(|value| value.to_string()).join(",")))?;
+        for hit in collisions {
+            let with = hit.with.name(self.world).replace(['"', ',', '\n', '\r'], " ");
+            self.collisions.append(&format!("{},{with},{}\n", hit.time_s, hit.impulse_n_s))?;
+        }
+        self.truth.add(step.truth.position());
+        self.odometry.add(step.dead_reckoned.position());
+        self.ends = Some((self.ends.map_or(step.truth, |(start, _)| start), step.truth));
+        Ok(())
+    }
+
+    /// Puts all files in their places, with the drawing and the summary.
+    ///
+    /// # Errors
+    /// When a file cannot be written.
+    pub fn finish(mut self, summary: &DriveSummary) -> Result<()> {
+        self.folder.complete(self.rows)?;
+        self.folder.complete(self.collisions)?;
+        let drawing = MapDrawing::new(self.world)
+            .title(format!("Open-loop drive in {}", self.world.spec.name))
+            .path(self.truth.points(), &PathStyle::TRUTH, "true path")
+            .path(self.odometry.points(), &PathStyle::ODOMETRY, "path by odometry");
+        let drawing = match self.ends {
+            Some((start, end)) => drawing.start(&start).end(&end),
+            None => drawing,
+        };
+        self.folder.write("path.svg", drawing.to_svg().as_bytes())?;
+        // Last, so that a folder with a summary is complete.
+        self.folder.write("summary.json", json(summary).as_bytes())?;
+        self.folder.finish()
+    }
+}
+
+/// A path of any length, thinned out evenly to what a drawing can show.
+#[derive(Debug, Clone)]
+struct Trail {
+    kept: Vec<Vector2<f64>>,
+    /// Every how manyth point is kept.
+    every: u64,
+    /// Points so far, and the last of them.
+    count: u64,
+    last: Option<Vector2<f64>>,
+}
+
+impl Default for Trail {
+    fn default() -> Self {
+        Self { kept: Vec::new(), every: 1, count: 0, last: None }
+    }
+}
+
+impl Trail {
+    /// Points kept at most.
+    const MOST: usize = 8192;
+
+    fn add(&mut self, point: Vector2<f64>) {
+        if self.count.is_multiple_of(self.every) {
+            if self.kept.len() == Self::MOST {
+                let mut index = 0;
+                self.kept.retain(|_| {
+                    index += 1;
+                    index % 2 == 1
+                });
+                self.every *= 2;
+            }
+            self.kept.push(point);
+        }
+        self.count += 1;
+        self.last = Some(point);
+    }
+
+    /// The points kept, and the last one.
+    fn points(&self) -> impl Iterator<Item = Vector2<f64>> + '_ {
+        let end = self.last.filter(|last| self.kept.last() != Some(last));
+        self.kept.iter().copied().chain(end)
+    }
 }
 
 /// The numbers of one state in the order of [`COLUMNS`].
@@ -113,14 +199,20 @@ fn row(step: &DriveStep) -> [f64; 33] {
     ]
 }
 
-/// True path beside odometry path.
-fn path_svg(world: &World, record: &DriveRecord) -> String {
-    use super::map::{MapDrawing, PathStyle};
-    MapDrawing::new(world)
-        .title(format!("Open-loop drive in {}", world.spec.name))
-        .path(record.steps.iter().map(|s| s.truth.position()), &PathStyle::TRUTH, "true path")
-        .path(record.steps.iter().map(|s| s.dead_reckoned.position()), &PathStyle::ODOMETRY, "path by odometry")
-        .start(&record.steps[0].truth)
-        .end(&record.last().truth)
-        .to_svg()
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_trail_of_any_length_keeps_its_ends_and_an_even_share() {
+        let mut trail = Trail::default();
+        for k in 0..100_001 {
+            trail.add(Vector2::new(f64::from(k), 0.0));
+        }
+        let points: Vec<_> = trail.points().map(|p| p.x).collect();
+        assert!(points.len() > Trail::MOST / 2 && points.len() <= Trail::MOST + 1, "{}", points.len());
+        assert_eq!((points[0], points[points.len() - 1]), (0.0, 100_000.0));
+        let steps: Vec<_> = points.windows(2).map(|w| w[1] - w[0]).collect();
+        assert!(steps[..steps.len() - 1].iter().all(|step| *step == steps[0]) && steps[0] == 16.0);
+    }
 }

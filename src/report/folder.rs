@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 use std::fs;
-use std::io;
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use crate::error::{Error, Result};
@@ -75,6 +75,32 @@ impl OutputFolder {
         Ok(())
     }
 
+    /// Begins one of the folder's files that is written piece by piece. It appears under its name with [`Self::complete`]; one that
+    /// is dropped before leaves nothing.
+    ///
+    /// # Errors
+    /// When the file cannot be created.
+    ///
+    /// # Panics
+    /// As [`Self::write`].
+    pub fn begin(&self, name: &'static str) -> Result<GrowingFile> {
+        assert!(self.names.contains(&name), "`{name}` is not announced");
+        let path = self.path.join(name);
+        let partial = partial_name(&path);
+        let file = fs::File::create(&partial).map_err(io_error("write", &path))?;
+        Ok(GrowingFile { name, path, partial, writer: io::BufWriter::new(file) })
+    }
+
+    /// Puts a file that was written piece by piece in its place.
+    ///
+    /// # Errors
+    /// When what is left of it cannot be written.
+    pub fn complete(&mut self, mut file: GrowingFile) -> Result<()> {
+        file.writer.flush().and_then(|()| fs::rename(&file.partial, &file.path)).map_err(io_error("write", &file.path))?;
+        self.written.insert(file.name);
+        Ok(())
+    }
+
     /// Removes what an earlier run has left and this one has not written.
     ///
     /// # Errors
@@ -84,19 +110,49 @@ impl OutputFolder {
     }
 }
 
+/// A file that is being written piece by piece, so that nobody has to hold all of it; see [`OutputFolder::begin`].
+#[derive(Debug)]
+pub struct GrowingFile {
+    name: &'static str,
+    path: PathBuf,
+    partial: PathBuf,
+    writer: io::BufWriter<fs::File>,
+}
+
+impl GrowingFile {
+    /// Appends to it.
+    ///
+    /// # Errors
+    /// When it cannot be written.
+    pub fn append(&mut self, text: &str) -> Result<()> {
+        self.writer.write_all(text.as_bytes()).map_err(io_error("write", &self.path))
+    }
+}
+
+impl Drop for GrowingFile {
+    fn drop(&mut self) {
+        // Best effort, and nothing to do once it is complete: the next run would remove it too.
+        let _ = fs::remove_file(&self.partial);
+    }
+}
+
 /// Writes a file under another name and renames it, so that it is never seen half written.
 ///
 /// # Errors
 /// When the file cannot be written.
 pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<()> {
-    let mut name = path.file_name().unwrap_or_default().to_owned();
-    name.push(PARTIAL);
-    let partial = path.with_file_name(name);
+    let partial = partial_name(path);
     fs::write(&partial, bytes).and_then(|()| fs::rename(&partial, path)).map_err(|source| {
         // Best effort: the write itself is what failed and what the caller hears about.
         let _ = fs::remove_file(&partial);
         Error::Io { action: "write", path: path.to_owned(), source }
     })
+}
+
+fn partial_name(path: &Path) -> PathBuf {
+    let mut name = path.file_name().unwrap_or_default().to_owned();
+    name.push(PARTIAL);
+    path.with_file_name(name)
 }
 
 fn remove(path: &Path) -> Result<()> {
@@ -134,6 +190,24 @@ mod tests {
         let mut held: Vec<_> = fs::read_dir(&path).unwrap().map(|e| e.unwrap().file_name()).collect();
         held.sort();
         assert_eq!(held, [".wayhome", "a.txt"], "what is stale is gone");
+    }
+
+    #[test]
+    fn a_growing_file_appears_whole_or_not_at_all() {
+        let base = tempfile::tempdir().unwrap();
+        let mut folder = OutputFolder::open(base.path(), "home", NAMES).unwrap();
+        let held = || fs::read_dir(base.path()).unwrap().count();
+        let mut file = folder.begin("a.txt").unwrap();
+        file.append("1").unwrap();
+        assert!(!base.path().join("a.txt").exists() && held() == 2);
+        drop(file);
+        assert_eq!(held(), 1, "the marker alone");
+        let mut file = folder.begin("a.txt").unwrap();
+        file.append("1").unwrap();
+        file.append("2").unwrap();
+        folder.complete(file).unwrap();
+        folder.finish().unwrap();
+        assert_eq!((fs::read(base.path().join("a.txt")).unwrap(), held()), (b"12".to_vec(), 2));
     }
 
     #[test]

@@ -16,7 +16,7 @@ pub mod run;
 pub mod seeds;
 pub mod text;
 
-pub use folder::{OutputFolder, write_atomically};
+pub use folder::{GrowingFile, OutputFolder, write_atomically};
 
 /// Indented JSON with a line end.
 pub fn json(value: &impl serde::Serialize) -> String {

@@ -1,5 +1,6 @@
 //! The page on the physics: a chart for each closed form, the slip map, and the comparison with another engine.
 
+use std::collections::BTreeMap;
 use std::fmt::Write;
 
 use super::OutputFolder;
@@ -25,10 +26,14 @@ pub const FILES: &[&str] = &[
     "slip-map.svg",
     OUTSIDE,
     "mujoco.svg",
+    SPEED,
 ];
 
 /// Trajectories of the same drives in another engine, written by `tests/outside/mujoco_planar.py`.
 pub const OUTSIDE: &str = "mujoco.csv";
+
+/// What the benchmark measured, written by `tests/outside/physics_speed.py`.
+pub const SPEED: &str = "speed.csv";
 
 /// All that the page shows.
 #[derive(Debug, Clone)]
@@ -43,6 +48,8 @@ pub struct Findings {
     pub slip_map: SlipMap,
     /// The text of [`OUTSIDE`] where the folder has one.
     pub outside: Option<String>,
+    /// The text of [`SPEED`] where the folder has one.
+    pub speed: Option<String>,
 }
 
 /// Writes the page and its drawings.
@@ -62,7 +69,11 @@ pub fn write(mut folder: OutputFolder, findings: &Findings) -> Result<()> {
         folder.write(OUTSIDE, text.as_bytes())?;
         folder.write("mujoco.svg", drives.svg().as_bytes())?;
     }
-    folder.write("README.md", page(findings, outside.as_ref()).as_bytes())?;
+    let speed = findings.speed.as_deref().map(Speed::parse).transpose()?;
+    if let Some(text) = &findings.speed {
+        folder.write(SPEED, text.as_bytes())?;
+    }
+    folder.write("README.md", page(findings, outside.as_ref(), speed.as_ref()).as_bytes())?;
     folder.finish()
 }
 
@@ -197,6 +208,44 @@ impl OutsideDrives {
     }
 }
 
+/// Nanoseconds that a substep takes in each benchmark, by name.
+struct Speed(BTreeMap<String, f64>);
+
+impl Speed {
+    fn parse(text: &str) -> Result<Self> {
+        let row = |(line, number): (&str, usize)| {
+            let time = line.split_once(',').and_then(|(name, ns)| Some((name.to_owned(), ns.parse().ok()?)));
+            time.ok_or_else(|| Error::Parse {
+                path: SPEED.into(),
+                message: format!("line {number}: expected a name and a number, as tests/outside/physics_speed.py writes them"),
+            })
+        };
+        text.lines().zip(1..).skip(1).map(row).collect::<Result<_>>().map(Self)
+    }
+
+    fn table(&self) -> String {
+        let mut text = "| scene | substeps a second and core | of the time rapier's |\n|---|---|---|\n".to_owned();
+        let push = |group: &str| self.0.get(&format!("{group}/pushing a carton"));
+        for (name, ns) in self.0.iter().filter(|(name, _)| !name.starts_with("rapier/pushing")) {
+            let share = match (push("rapier"), name.as_str()) {
+                (Some(rapier), "plant/pushing a carton") => format!("{:.0} %", 100.0 * rapier / ns),
+                (_, "rapier/in every substep") => self
+                    .0
+                    .get("plant/open floor")
+                    .map_or_else(String::new, |ours| format!("{:.0} %", 100.0 * (1.0 - ours / ns))),
+                _ => "none".to_owned(),
+            };
+            let _ = writeln!(text, "| `{name}` | {} | {share} |", rounded(1e9 / ns));
+        }
+        text
+    }
+}
+
+/// A large number, to two digits or so.
+fn rounded(value: f64) -> String {
+    if value >= 1e6 { format!("{:.1} million", value / 1e6) } else { format!("{:.0} 000", (value / 1e4).round() * 10.0) }
+}
+
 fn percent(share: f64) -> String {
     match 100.0 * share {
         small if small < 1e-4 => "below 0.0001 %".to_owned(),
@@ -205,7 +254,7 @@ fn percent(share: f64) -> String {
     }
 }
 
-fn page(findings: &Findings, outside: Option<&OutsideDrives>) -> String {
+fn page(findings: &Findings, outside: Option<&OutsideDrives>, speed: Option<&Speed>) -> String {
     let mut text = "# The physics against its closed forms\n\n\
         Made by `wayhome physics-report --out results/physics`. Lines are equations, points are the plant of the program at its\n\
         substep of 1 ms. The same equations are tests in `tests/physics.rs` and `tests/physics_settings.rs`. Robot: an iRobot\n\
@@ -247,8 +296,21 @@ fn page(findings: &Findings, outside: Option<&OutsideDrives>) -> String {
         text += &drives.table();
         text += "\n![MuJoCo](mujoco.svg)\n";
     }
+    if let Some(speed) = speed {
+        text += "\n## Speed\n\n";
+        text += SPEED_STORY;
+        text += "\n\n";
+        text += &speed.table();
+    }
     text
 }
+
+/// What the benchmark does.
+const SPEED_STORY: &str = "`cargo bench --bench physics`, then `tests/outside/physics_speed.py`: a robot with 4 walls, 10 standing and 5 moving bodies\n\
+    around it, in substeps of 1 ms, by the core's own time (median). Rapier runs only where something can be pushed. Its share of\n\
+    a push is what the same scene takes in rapier alone; `rapier/in every substep` is the open floor with rapier asked each\n\
+    time, as it would be without a look around first. The machine is shared, and its numbers vary by a factor of two with its\n\
+    other load.";
 
 /// What `tests/outside/mujoco_planar.py` does, and why the paths differ.
 const OUTSIDE_STORY: &str = "`tests/outside/mujoco_planar.py` drives the same Create 3 (equal wheels, no rolling resistance) through the same commands in\n\

@@ -71,6 +71,9 @@ pub fn run(summary: &Summary, folder: &Path) -> String {
     table(&headline, &rows)
 }
 
+/// Collisions that a text lists at most.
+const MOST_COLLISIONS: usize = 20;
+
 /// An open-loop drive.
 #[must_use]
 pub fn drive(summary: &DriveSummary, folder: &Path) -> String {
@@ -87,8 +90,11 @@ pub fn drive(summary: &DriveSummary, folder: &Path) -> String {
         ("greatest speed", format!("{:.3} m/s", s.greatest_speed_m_s)),
         ("greatest slip", format!("{:.4} m/s, mean of a control step", s.greatest_slip_m_s)),
     ];
-    for hit in &s.collision_list {
+    for hit in s.collision_list.iter().take(MOST_COLLISIONS) {
         rows.push(("collision", format!("{:.3} s, {}, {:.3} N s", hit.time_s, hit.with, hit.impulse_n_s)));
+    }
+    if s.collisions > MOST_COLLISIONS {
+        rows.push(("collisions", format!("{} in all, in collisions.csv", s.collisions)));
     }
     rows.push(("files", folder.display().to_string()));
     table(&format!("drove {:.2} m in {:.1} s", s.path_length_m, s.time_s), &rows)

@@ -124,7 +124,13 @@ impl Body {
     /// Whether it stands where it is unless something pushes it.
     #[must_use]
     pub fn stands(&self) -> bool {
-        matches!(self.motion, None | Some(MotionSpec::Pushed { .. }))
+        self.motion.is_none() || self.can_be_pushed()
+    }
+
+    /// Whether it gives way when something pushes it.
+    #[must_use]
+    pub fn can_be_pushed(&self) -> bool {
+        matches!(self.motion, Some(MotionSpec::Pushed { .. }))
     }
 }
 

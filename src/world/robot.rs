@@ -3,22 +3,40 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// A ready-made robot. Numbers that no source gives (inertia of a wheel, gains of the speed loop, creep, what calibration
-/// leaves over) are typical ones for a robot of the size.
+/// A ready-made robot. For each, its numbers are told apart by where they come from:
+/// - *published*: a data sheet or a file of the maker gives them,
+/// - *derived* from published ones, as said,
+/// - *assumed*: typical for a robot of the size; nobody publishes them.
+///
+/// Assumed for all of them: the inertia of a wheel with gear and rotor, rolling resistance 0.01 (hard rubber on a hard floor),
+/// friction of the caster 0.05 of the floor's, creep 0.01 m/s, gains of the speed loop (chosen to settle in half a second), and
+/// wheel radii that calibration left wrong by +0.15 and -0.05 %. Yaw inertia is derived: a uniform disc of mass and radius.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum RobotPreset {
-    /// iRobot Create 3. Mass 2.3 kg, radius 0.164 m, track 0.233 m, wheel radius 0.036 m, caster 0.125 m ahead of the axle,
-    /// 0.306 m/s, 1.9 rad/s, 0.9 m/s^2, 508.8 counts a turn: iRobot Education, Create 3 documentation and its simulator's robot
-    /// description. The motors are those of a small gear motor.
+    /// iRobot Create 3 with a mast for the camera.
+    /// - Published: 0.306 m/s with its safety features on, 0.9 m/s^2, 508.8 counts a turn (iRobot Education, Create 3
+    ///   documentation: safety, odometry); mass 2.3 kg, radius 0.164 m, track 0.233 m, caster 0.125 m ahead of the axle, 1.9 rad/s
+    ///   (its simulator `create3_sim`: robot description and `control.yaml`).
+    /// - Derived: wheel radius 0.036 m, rounded from the simulator's 0.03575 m.
+    /// - Assumed: centre of gravity 0.03 m ahead of the axle (the documentation says ahead, the simulator 0.023 m before bumper
+    ///   and mast), height 0.35 m with the mast, motors of 0.6 N m stalled and 16 rad/s unloaded at the wheel, which leave torque
+    ///   at its true top speed of 0.46 m/s (12.8 rad/s).
     #[default]
     Create3,
-    /// TurtleBot3 Burger. 178 mm wide and 192 mm high, wheels of 66 mm on a track of 160 mm, 2.84 rad/s, 4096 counts a turn:
-    /// ROBOTIS, TurtleBot3 e-manual; 1.2 kg: MVSim's vehicle file. Its DYNAMIXEL XL430-W250 stall at 1.5 N m and turn 61 times a
-    /// minute at 12 V (ROBOTIS, XL430-W250 e-manual), which is 0.21 m/s: a little less than the 0.22 m/s of the robot's sheet.
+    /// TurtleBot3 Burger.
+    /// - Published: height 0.192 m, 2.84 rad/s (ROBOTIS, TurtleBot3 e-manual: specifications); XL430-W250 motors of 1.5 N m
+    ///   stalled and 61 turns a minute unloaded at 12 V, 12-bit encoder (e-manual: appendix DYNAMIXEL); wheel radius 0.033 m, track
+    ///   0.16 m, caster 0.081 m behind the axle (`turtlebot3_description`, burger); radius 0.105 m (its navigation's cost map).
+    /// - Derived: 1.2 kg, chassis and wheels of MVSim's vehicle file (the e-manual has 1 kg); 4096 counts a turn, the encoder's 12
+    ///   bits; 0.19 m/s, nine tenths of what the motors turn unloaded (the sheet's 0.22 m/s is above that speed).
+    /// - Assumed: centre of gravity 0.03 m behind the axle (that of the body's box in the description), 1 m/s^2.
     Turtlebot3,
-    /// A laboratory robot of 5 kg on two Pololu 37D gear motors, 50:1, 12 V: 200 turns a minute without load, 2.06 N m stalled,
-    /// 3200 counts a turn of the wheel (Pololu, 37D Metal Gearmotors data sheet). All else is of our choice.
+    /// A laboratory robot on two Pololu 37D gear motors, 50:1, 12 V.
+    /// - Published: 200 turns a minute unloaded, 21 kg cm stalled by extrapolation, which is 2.06 N m (Pololu, 37D Metal
+    ///   Gearmotors data sheet).
+    /// - Derived: 3200 counts a turn, 64 of the motor's encoder times 50.
+    /// - Assumed: all else. It is no robot that one can buy.
     Generic,
 }
 
