@@ -10,6 +10,7 @@ mod drive;
 mod home;
 mod physics_report;
 mod render;
+mod render_report;
 mod robustness;
 mod world;
 
@@ -37,6 +38,7 @@ pub fn run(args: Args) -> Result<Verdict> {
         Command::Robustness(args) => robustness::run(&args, &context),
         Command::Bound(args) => bound::run(&args, &context),
         Command::Render(args) => render::run(&args, &context),
+        Command::RenderReport(args) => render_report::run(&args, &context),
         Command::World(args) => world::run(&args, &context),
     }
 }

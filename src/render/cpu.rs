@@ -16,7 +16,7 @@ use super::hits::ColumnHits;
 use super::sample::{LANES, POINTS, PointRoom, RUN};
 use super::shade::{Plane, SideRoom, shade_side};
 use super::spans::{NOTHING, Spans};
-use super::{Renderer, RendererInfo, Scene, View};
+use super::{InstructionSet, Renderer, RendererInfo, Scene, View};
 use crate::error::Result;
 use crate::panorama::Panorama;
 
@@ -36,6 +36,7 @@ type BandBuffers<'a> = (usize, ((&'a mut [u8], &'a mut [f32]), &'a mut [u16]));
 #[derive(Debug)]
 pub struct CpuRenderer {
     info: RendererInfo,
+    instructions: InstructionSet,
     /// Those that are idle; there are as many as pictures were ever rendered at once.
     painters: Mutex<Vec<Painter>>,
 }
@@ -50,16 +51,29 @@ struct Painter {
 }
 
 impl CpuRenderer {
-    /// A renderer; its buffers grow with the first picture.
+    /// A renderer on the widest instruction set at hand; its buffers grow with the first picture.
     #[must_use]
     pub fn new() -> Self {
-        let info = RendererInfo { kind: "cpu".to_owned(), adapter: instruction_set().to_owned(), driver: String::new() };
-        Self { info, painters: Mutex::new(Vec::new()) }
+        Self::with(InstructionSet::best())
     }
 
-    /// Does something with an idle painter, or a new one.
-    fn paint_with<T>(&self, work: impl FnOnce(&mut Painter) -> T) -> T {
-        with_idle(&self.painters, work)
+    /// A renderer on an instruction set of choice.
+    ///
+    /// # Errors
+    /// When this processor does not have it.
+    pub fn on(instructions: InstructionSet) -> Result<Self> {
+        instructions.available().map(Self::with)
+    }
+
+    fn with(instructions: InstructionSet) -> Self {
+        let adapter = format!("{} with {instructions} instructions", std::env::consts::ARCH);
+        let info = RendererInfo { kind: "cpu".to_owned(), adapter, driver: String::new() };
+        Self { info, instructions, painters: Mutex::new(Vec::new()) }
+    }
+
+    /// Renders a view; `share` its bands with the other threads or paint them all in this one.
+    fn paint(&self, scene: &Scene, view: &View<'_>, out: &mut Panorama, share: bool) -> Result<()> {
+        with_idle(&self.painters, |painter| painter.paint(self.instructions, scene, view, out, share))
     }
 }
 
@@ -73,14 +87,6 @@ fn with_idle<I: Default, T>(things: &Mutex<Vec<I>>, work: impl FnOnce(&mut I) ->
     result
 }
 
-fn instruction_set() -> &'static str {
-    #[cfg(target_arch = "x86_64")]
-    if is_x86_feature_detected!("avx2") {
-        return "x86_64 with AVX2";
-    }
-    std::env::consts::ARCH
-}
-
 impl Default for CpuRenderer {
     fn default() -> Self {
         Self::new()
@@ -91,19 +97,15 @@ impl Renderer for CpuRenderer {
     fn render(&mut self, scene: &Scene, view: &View<'_>, out: &mut Panorama) -> Result<()> {
         // Inside a pool the caller already spreads pictures over the cores.
         let alone = rayon::current_thread_index().is_none();
-        self.paint_with(|painter| painter.paint(scene, view, out, alone))
+        self.paint(scene, view, out, alone)
     }
 
     fn render_group(&mut self, scene: &Scene, views: &[View<'_>], out: &mut [Panorama]) -> Result<()> {
         assert_eq!(views.len(), out.len(), "a place for each view");
         if let ([view], [out]) = (views, &mut *out) {
-            return self.paint_with(|painter| painter.paint(scene, view, out, true));
+            return self.paint(scene, view, out, true);
         }
-        views
-            .par_iter()
-            .zip(out)
-            .with_max_len(1)
-            .try_for_each(|(view, out)| self.paint_with(|painter| painter.paint(scene, view, out, false)))
+        views.par_iter().zip(out).with_max_len(1).try_for_each(|(view, out)| self.paint(scene, view, out, false))
     }
 
     fn info(&self) -> &RendererInfo {
@@ -113,15 +115,18 @@ impl Renderer for CpuRenderer {
 
 impl Painter {
     /// Renders a view; `share` its bands with the other threads or paint them all in this one.
-    fn paint(&mut self, scene: &Scene, view: &View<'_>, out: &mut Panorama, share: bool) -> Result<()> {
+    fn paint(
+        &mut self,
+        instructions: InstructionSet,
+        scene: &Scene,
+        view: &View<'_>,
+        out: &mut Panorama,
+        share: bool,
+    ) -> Result<()> {
         self.frame.prepare(scene, view)?;
         self.hits.find(&self.frame);
         self.spans.find(&self.frame, &self.hits);
-        let pixels = view.projection.pixels();
-        out.projection = view.projection;
-        out.rgba.resize(4 * pixels, 0);
-        out.range_m.resize(pixels, 0.0);
-        out.instance.resize(pixels, 0);
+        out.reshape(view.projection)?;
         let (width, height) = (view.projection.width as usize, view.projection.height as usize);
         let most = (BAND_PIXELS / width).clamp(LEAST_ROWS, BAND);
         let most = if share { most.min(height.div_ceil(rayon::current_num_threads())) } else { most };
@@ -130,6 +135,11 @@ impl Painter {
         let paint_band = |(k, ((rgba, range), instance)): BandBuffers<'_>| {
             with_idle(&self.desks, |desk| {
                 let (frame, hits, spans) = (&self.frame, &self.hits, &self.spans);
+                let paint = match instructions {
+                    InstructionSet::Portable => paint,
+                    InstructionSet::Avx2 => paint_avx2,
+                    InstructionSet::Avx512 => paint_avx512,
+                };
                 paint(Band { scene, frame, hits, spans, first_row: k * rows, rgba, range, instance }, desk);
             });
         };
@@ -263,11 +273,8 @@ impl Desk {
     }
 }
 
-/// Paints a band, on the widest vector unit at hand: results are the same on all.
-#[multiversion::multiversion(targets(
-    "x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl+bmi1+bmi2+lzcnt+popcnt",
-    "x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"
-))]
+/// Paints a band. Inlined into the functions below, all of it is compiled once for each instruction set; results are the same.
+#[inline(always)]
 fn paint(mut band: Band<'_>, desk: &mut Desk) {
     let width = band.frame.params.width as usize;
     let rows = band.range.len() / width;
@@ -281,6 +288,17 @@ fn paint(mut band: Band<'_>, desk: &mut Desk) {
     for row in 0..rows {
         show_row(&mut band, desk, row);
     }
+}
+
+#[multiversion::multiversion(targets("x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"))]
+fn paint_avx2(band: Band<'_>, desk: &mut Desk) {
+    paint(band, desk);
+}
+
+/// The crate adds the other parts of AVX-512 that processors have on which it is fast.
+#[multiversion::multiversion(targets("x86_64+avx512f+avx2+bmi1+bmi2+lzcnt+popcnt"))]
+fn paint_avx512(band: Band<'_>, desk: &mut Desk) {
+    paint(band, desk);
 }
 
 /// Shades the upright faces of a column and notes the horizontal ones, and what the rows show.

@@ -326,13 +326,12 @@ impl GpuRenderer {
             let mapped = readback.get_mapped_range(0..under.bytes).map_err(|e| gpu_error(&e))?;
             let words: &[u32] = bytemuck::try_cast_slice(&mapped).map_err(|e| gpu_error(&e))?;
             let pixels = view.projection.pixels();
-            out.projection = view.projection;
-            out.rgba.clear();
-            out.rgba.extend_from_slice(bytemuck::cast_slice(&words[..pixels]));
-            out.range_m.clear();
-            out.range_m.extend_from_slice(bytemuck::cast_slice(&words[pixels..2 * pixels]));
-            out.instance.clear();
-            out.instance.extend(words[2 * pixels..3 * pixels].iter().map(|&id| id as u16));
+            out.reshape(view.projection)?;
+            out.rgba.copy_from_slice(bytemuck::cast_slice(&words[..pixels]));
+            out.range_m.copy_from_slice(bytemuck::cast_slice(&words[pixels..2 * pixels]));
+            for (instance, id) in out.instance.iter_mut().zip(&words[2 * pixels..3 * pixels]) {
+                *instance = *id as u16;
+            }
         }
         readback.unmap();
         Ok(())

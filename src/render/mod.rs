@@ -24,6 +24,7 @@ mod cpu;
 mod frame;
 mod gpu;
 mod hits;
+mod instructions;
 mod sample;
 mod scene;
 mod shade;
@@ -38,6 +39,7 @@ use crate::panorama::{Panorama, Projection};
 pub use camera::Camera;
 pub use cpu::CpuRenderer;
 pub use gpu::{GpuRenderer, SHADER};
+pub use instructions::InstructionSet;
 pub use scene::Scene;
 
 /// Which renderer a person asks for.
@@ -92,10 +94,12 @@ pub trait Renderer: Send {
     /// When `out` is not as long as `views`.
     fn render_group(&mut self, scene: &Scene, views: &[View<'_>], out: &mut [Panorama]) -> Result<()>;
 
-    /// Renders many views and shows them to `sink` in their order, some at a time, with the number of the first of them.
+    /// Renders many views and shows them to `sink` in their order, some at a time, with the number of the first of them. It may
+    /// do with them as it likes, for instance develop them by a camera.
     ///
-    /// While `sink` works on one group of pictures the next one is rendered. At most two groups are in memory: as many pictures
-    /// as 32 MiB hold, at most 32 for each thread of the pool, and at least two for each. Each view has its own poses of
+    /// While `sink` works on one group of pictures the next one is rendered. At most two groups are in memory, whatever the length
+    /// of the batch: together two to 32 pictures for each thread of the pool, the fewer the larger they are. A GPU holds three
+    /// more, twice each. Each view has its own poses of
     /// robot and bodies, so that a batch may be a film of moving bodies.
     ///
     /// ```
@@ -123,7 +127,7 @@ pub trait Renderer: Send {
         &mut self,
         scene: &Scene,
         views: &[View<'_>],
-        sink: &mut (dyn FnMut(usize, &[Panorama]) -> Result<()> + Send),
+        sink: &mut (dyn FnMut(usize, &mut [Panorama]) -> Result<()> + Send),
     ) -> Result<()> {
         batch::run(self, scene, views, sink)
     }

@@ -11,9 +11,11 @@ pub mod image;
 pub mod map;
 mod path_plot;
 pub mod physics;
+pub mod render;
 pub mod robustness;
 pub mod run;
 pub mod seeds;
+pub mod sheet;
 pub mod text;
 
 pub use folder::{GrowingFile, OutputFolder, write_atomically};
