@@ -5,7 +5,7 @@
 use wayhome::Error;
 use wayhome::geometry::Pose;
 use wayhome::panorama::{Panorama, Projection};
-use wayhome::render::{CpuRenderer, GpuRenderer, Renderer, Scene, View};
+use wayhome::render::{CpuRenderer, GpuRenderer, InstructionSet, Renderer, Scene, View};
 use wayhome::world::World;
 
 /// A robot that turns on the spot while all bodies wander.
@@ -115,4 +115,23 @@ fn a_batch_ends_with_its_first_error() {
     assert!(error.unwrap_err().to_string().contains("NaN"));
     assert!(shown < 200);
     CpuRenderer::new().render_batch(&film.scene, &[], &mut |_, _| panic!("nothing to show")).unwrap();
+}
+
+#[test]
+fn instruction_sets_and_their_widths_do_not_change_the_picture() {
+    // Sizes that are no multiple of a vector, a group of columns or a band.
+    for (width, height) in [(96, 13), (301, 517), (1000, 40)] {
+        let film = Film::new(3, width, height);
+        for view in film.views() {
+            let picture = |set| {
+                let mut out = Panorama::empty();
+                CpuRenderer::on(set).unwrap().render(&film.scene, &view, &mut out).unwrap();
+                out
+            };
+            let portable = picture(InstructionSet::Portable);
+            for set in InstructionSet::ALL.into_iter().filter(|set| set.is_available()) {
+                assert!(picture(set) == portable, "{set}, {width} x {height}");
+            }
+        }
+    }
 }

@@ -56,7 +56,7 @@ pub fn run(args: &RenderReportArgs, context: &Context) -> Result<Verdict> {
 /// Home and some places of a world, under its own light, as its own camera sees them.
 fn world_sheet(world: &World) -> Result<Sheet> {
     let scene = Scene::new(world)?;
-    let (mut camera, mut renderer) = (Camera::new(world.spec.camera.optics.clone()), CpuRenderer::new());
+    let (mut camera, mut renderer) = (Camera::new(world.spec.camera.optics), CpuRenderer::new());
     let (mut sheet, mut panorama, bodies) = (Sheet::new(), Panorama::empty(), world.body_poses());
     for robot in film::poses(world, POSES, Seed(0))? {
         let view = View { projection: world.projection_of_size(SIZE.0, SIZE.1), robot, bodies: &bodies };

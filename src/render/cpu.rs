@@ -14,7 +14,7 @@ use super::columns::Face;
 use super::frame::{FAR, Frame, Row};
 use super::hits::ColumnHits;
 use super::sample::{LANES, POINTS, PointRoom, RUN};
-use super::shade::{Plane, SideRoom, shade_side};
+use super::shade::{Plane, Side, SideRoom, Sight};
 use super::spans::{NOTHING, Spans};
 use super::{InstructionSet, Renderer, RendererInfo, Scene, View};
 use crate::error::Result;
@@ -22,8 +22,8 @@ use crate::panorama::Panorama;
 
 /// Most rows in a band: the unit of work of a thread.
 const BAND: usize = RUN;
-/// Most pixels in a band that is higher than [`LEAST_ROWS`]: its colours stay in the second cache.
-const BAND_PIXELS: usize = 192 << 10;
+/// Most pixels in a band that is higher than [`LEAST_ROWS`]: low bands cut columns short, high ones leave the second cache.
+const BAND_PIXELS: usize = 384 << 10;
 /// Rows of a band of a very wide picture.
 const LEAST_ROWS: usize = 16;
 /// Colour where there is nothing.
@@ -279,9 +279,17 @@ fn paint(mut band: Band<'_>, desk: &mut Desk) {
     let width = band.frame.params.width as usize;
     let rows = band.range.len() / width;
     desk.prepare(band.frame, rows);
+    let mut runs = Vec::new();
     for first in (0..width).step_by(LANES) {
         for column in first..width.min(first + LANES) {
-            lay_out(&band, desk, rows, column);
+            lay_out(&band, desk, rows, column, &mut runs);
+        }
+        for run in runs.drain(..) {
+            let colours = &mut desk.columns.0[run.column % LANES][run.start..];
+            match &run.side {
+                Some(side) => side.shade(band.frame, &mut desk.side, colours),
+                None => colours[..run.count].fill(VOID),
+            }
         }
         desk.turn(rows, first);
     }
@@ -301,9 +309,17 @@ fn paint_avx512(band: Band<'_>, desk: &mut Desk) {
     paint(band, desk);
 }
 
-/// Shades the upright faces of a column and notes the horizontal ones, and what the rows show.
+/// Rows of a column to be shaded: they see an upright face, or nothing.
+struct Run<'a> {
+    column: usize,
+    start: usize,
+    count: usize,
+    side: Option<Side<'a>>,
+}
+
+/// Notes what a column shows. Texels of upright faces are asked for, so that they are there when the runs are shaded.
 #[inline(always)]
-fn lay_out(band: &Band<'_>, desk: &mut Desk, rows: usize, column: usize) {
+fn lay_out<'a>(band: &Band<'a>, desk: &mut Desk, rows: usize, column: usize, runs: &mut Vec<Run<'a>>) {
     let (frame, eye) = (band.frame, band.frame.params.camera_height);
     let hits = band.hits.of(column);
     for span in band.spans.of(column) {
@@ -323,14 +339,14 @@ fn lay_out(band: &Band<'_>, desk: &mut Desk, rows: usize, column: usize) {
         let (next, instance) = (desk.first_change[start], (span.surface + 1) as u16);
         desk.changes.push(Change { next, column: column as u32, instance, near, height, room });
         desk.first_change[start] = desk.changes.len() as u32;
-        let colours = &mut desk.columns.0[column % LANES][start..];
+        let count = end - start;
         match (span.face, hit) {
             (Face::Side, Some(hit)) => {
-                let row = band.first_row + start;
-                let direction = frame.directions[column];
-                shade_side(band.scene, frame, hit, direction, row, end - start, &mut desk.side, colours);
+                let side = Side::new(band.scene, frame, hit, frame.directions[column], band.first_row + start, count);
+                side.fetch();
+                runs.push(Run { column, start, count, side: Some(side) });
             }
-            _ if span.surface == NOTHING => colours[..end - start].fill(VOID),
+            _ if span.surface == NOTHING => runs.push(Run { column, start, count, side: None }),
             _ => note_level(desk, span.surface, span.face, start..end, column),
         }
     }
@@ -376,7 +392,8 @@ fn show_row(band: &mut Band<'_>, desk: &mut Desk, number: usize) {
             let plane = Plane::new(band.scene, frame, level.surface, level.face == Face::Underside);
             let height = plane.height() - frame.params.camera_height;
             let t = if level.surface < 2 { row.plane } else { height * row.inverse_tan };
-            plane.shade(band.scene, frame, [x, y], t, row, level.masks[number], &mut desk.point, out);
+            let sight = Sight { scene: band.scene, frame, row, t };
+            plane.shade(sight, [x, y], level.masks[number], &mut desk.point, out);
         }
     }
     let places = width * number..width * (number + 1);

@@ -8,7 +8,7 @@
 //! Coordinates are in 1/65536 texel of the finest level. They may wrap around: a tile's edge is a power of two.
 
 use super::scene::Material;
-use super::texels::Texels;
+use super::texels::{Texels, fetch};
 
 /// Pixels calculated at once: the 32-bit lanes of the widest vector.
 pub(super) const LANES: usize = 16;
@@ -155,9 +155,19 @@ impl<'a> Lines<'a> {
         let log2_size = material.log2_size - level;
         let (base, mask) = (level_base(material, level), (1_i32 << log2_size) - 1);
         let u = on_level(u, level);
-        let first = &atlas[base + (((u >> 8 & mask) as usize) << log2_size)..];
-        let second = &atlas[base + ((((u >> 8) + 1 & mask) as usize) << log2_size)..];
+        let first = &atlas[base + ((((u >> 8) & mask) as usize) << log2_size)..];
+        let second = &atlas[base + (((((u >> 8) + 1) & mask) as usize) << log2_size)..];
         Self { first, second, length: 1 << log2_size, weight: (u >> 4 & 15) as u32 }
+    }
+
+    /// Asks for `count` texels from `from` on.
+    #[inline(always)]
+    fn fetch(&self, from: i32, count: usize) {
+        for k in (0..count + LANES).step_by(LANES) {
+            let at = (from as usize).wrapping_add(k) & (self.length - 1);
+            fetch(&self.first[at..]);
+            fetch(&self.second[at..]);
+        }
     }
 
     /// Mixes the lines by means alone, from texel `from` on, which may be any number, as tiles repeat. Whole blocks are written,
@@ -168,25 +178,38 @@ impl<'a> Lines<'a> {
         let mut done = 0;
         while done < count {
             let some = (count - done).min(self.length - from);
-            let blocks = some.div_ceil(LANES);
-            let (first, second) = (&self.first[from..], &self.second[from..]);
-            let out = &mut out[done..];
-            for ((a, b), out) in first.as_chunks().0.iter().zip(second.as_chunks().0).zip(out.as_chunks_mut().0).take(blocks) {
-                self.mix_block(a, b, out);
-            }
+            let whole = some.next_multiple_of(LANES);
+            let blocks = |line: &'a [u32]| line[from..from + whole].as_chunks::<LANES>().0;
+            let out = out[done..done + whole].as_chunks_mut::<LANES>().0;
+            self.mix_blocks(blocks(self.first), blocks(self.second), out);
             (done, from) = (done + some, 0);
         }
     }
 
     #[inline(always)]
-    fn mix_block(&self, a: &Block, b: &Block, out: &mut Block) {
-        let choose = |bit: u32| -> &[u8; 4 * LANES] { bytemuck::cast_ref(if self.weight >> bit & 1 == 0 { a } else { b }) };
+    fn mix_blocks(&self, a: &[Block], b: &[Block], out: &mut [Block]) {
+        let choose = |bit: u32| if self.weight >> bit & 1 == 0 { a } else { b };
         let [w, x, y, z] = [choose(0), choose(1), choose(2), choose(3)];
-        let (a, out): (&[u8; 4 * LANES], &mut [u8; 4 * LANES]) = (bytemuck::cast_ref(a), bytemuck::cast_mut(out));
-        for k in 0..4 * LANES {
-            out[k] = mean(mean(mean(mean(a[k], w[k]), x[k]), y[k]), z[k]);
+        for (((((a, w), x), y), z), out) in a.iter().zip(w).zip(x).zip(y).zip(z).zip(out) {
+            let [a, w, x, y, z] = [a, w, x, y, z].map(bytes);
+            let out = bytes_mut(out);
+            for k in 0..4 * LANES {
+                out[k] = mean(mean(mean(mean(a[k], w[k]), x[k]), y[k]), z[k]);
+            }
         }
     }
+}
+
+/// The channels of a block.
+#[inline(always)]
+fn bytes(block: &Block) -> &[u8; 4 * LANES] {
+    bytemuck::cast_ref(block)
+}
+
+/// The same, to be written.
+#[inline(always)]
+fn bytes_mut(block: &mut Block) -> &mut [u8; 4 * LANES] {
+    bytemuck::cast_mut(block)
 }
 
 /// Where the texels lie that a run of rows needs. Looking texels up runs one by one, calculating with them in vectors: each is
@@ -194,14 +217,14 @@ impl<'a> Lines<'a> {
 #[derive(Debug)]
 pub(super) struct StripRoom {
     coarse: [u32; REACH],
-    texels: [u32; REACH + 2 * LANES],
+    texels: [u32; REACH + 3 * LANES],
     places: [u32; RUN],
     pairs: [Pair; RUN],
 }
 
 impl Default for StripRoom {
     fn default() -> Self {
-        Self { coarse: [0; REACH], texels: [0; REACH + 2 * LANES], places: [0; RUN], pairs: [[0; 2]; RUN] }
+        Self { coarse: [0; REACH], texels: [0; REACH + 3 * LANES], places: [0; RUN], pairs: [[0; 2]; RUN] }
     }
 }
 
@@ -210,9 +233,9 @@ impl Default for StripRoom {
 /// The coarser level is mixed into the texels of the finer one, so that each row only takes two neighbours.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Strip<'a> {
-    atlas: &'a [u32],
-    material: &'a Material,
-    u: i32,
+    pub atlas: &'a [u32],
+    pub material: &'a Material,
+    pub u: i32,
     /// v of the first row, and its change from row to row.
     v: i32,
     step: i32,
@@ -233,6 +256,18 @@ impl<'a> Strip<'a> {
     #[inline(always)]
     fn at(&self, level: u32, row: usize) -> i32 {
         on_level(self.v.wrapping_add(self.step.wrapping_mul(row as i32)), level)
+    }
+
+    /// Asks for the texels of `count` rows.
+    #[inline(always)]
+    pub fn fetch(&self, count: usize) {
+        let level = (self.level >> 8) as u32;
+        let lowest = self.at(level, count - 1) >> 8;
+        let span = ((self.at(level, 0) >> 8).wrapping_sub(lowest) & around(level)) as usize + 2;
+        Lines::new(self.atlas, self.material, level, self.u).fetch(lowest, span);
+        if self.level >> 6 & 3 != 0 {
+            Lines::new(self.atlas, self.material, level + 1, self.u).fetch((lowest >> 1) - 1, span / 2 + 3);
+        }
     }
 
     /// Colours of as many rows as there is `light` for.
@@ -274,31 +309,55 @@ impl<'a> Strip<'a> {
     /// Texels from `lowest` on, mixed along u and between levels.
     #[inline(always)]
     fn fill(&self, level: u32, lowest: i32, count: usize, room: &mut StripRoom) {
-        const HALF: usize = LANES / 2;
         let quarters = self.level >> 6 & 3;
         Lines::new(self.atlas, self.material, level, self.u).mix(lowest, count, &mut room.texels);
         if quarters == 0 {
             return;
         }
         let below = (lowest >> 1) - 1;
-        Lines::new(self.atlas, self.material, level + 1, self.u).mix(below, count / 2 + 3, &mut room.coarse);
-        for (k, out) in room.texels.as_chunks_mut::<LANES>().0.iter_mut().take(count.div_ceil(LANES)).enumerate() {
-            // At the middle of a finer texel the coarser level is three parts of its own texel and one of the nearer neighbour.
-            let from = room.coarse[HALF * k..].first_chunk::<{ HALF + 2 }>().unwrap_or(&[0; HALF + 2]);
-            let (mut own, mut neighbour) = ([0_u64; HALF], [0_u64; HALF]);
-            for j in 0..HALF {
-                own[j] = u64::from(from[j + 1]) | u64::from(from[j + 1]) << 32;
-                neighbour[j] = u64::from(from[j]) | u64::from(from[j + 2]) << 32;
+        let halves = (count / 2 + 1).next_multiple_of(LANES);
+        Lines::new(self.atlas, self.material, level + 1, self.u).mix(below, halves + 2, &mut room.coarse);
+        // At the middle of a finer texel the coarser level is three parts of its own texel and one of the nearer neighbour.
+        for from in (0..halves).step_by(LANES) {
+            let (Some(before), Some(own), Some(after)) = (
+                room.coarse[from..].first_chunk::<LANES>(),
+                room.coarse[from + 1..].first_chunk::<LANES>(),
+                room.coarse[from + 2..].first_chunk::<LANES>(),
+            ) else {
+                return;
+            };
+            let (mut even, mut odd) = ([0; LANES], [0; LANES]);
+            three_to_one(own, before, &mut even);
+            three_to_one(own, after, &mut odd);
+            let fine = &mut room.texels[2 * from..][..2 * LANES];
+            let mut coarse = [0; 2 * LANES];
+            for k in 0..LANES {
+                coarse[2 * k] = even[k];
+                coarse[2 * k + 1] = odd[k];
             }
-            let (own, neighbour): (&[u8; 4 * LANES], &[u8; 4 * LANES]) =
-                (bytemuck::cast_ref(&own), bytemuck::cast_ref(&neighbour));
-            let out: &mut [u8; 4 * LANES] = bytemuck::cast_mut(out);
-            for k in 0..4 * LANES {
-                let coarse = mean(own[k], mean(own[k], neighbour[k]));
-                let half = mean(out[k], coarse);
-                out[k] = if quarters == 2 { half } else { mean(half, if quarters == 1 { out[k] } else { coarse }) };
+            for (fine, coarse) in fine.as_chunks_mut().0.iter_mut().zip(coarse.as_chunks().0) {
+                towards_texels(bytes_mut(fine), bytes(coarse), quarters);
             }
         }
+    }
+}
+
+/// Three parts of one texel and one of another.
+#[inline(always)]
+fn three_to_one(own: &Block, other: &Block, out: &mut Block) {
+    let (own, other, out) = (bytes(own), bytes(other), bytes_mut(out));
+    for k in 0..4 * LANES {
+        out[k] = mean(own[k], mean(own[k], other[k]));
+    }
+}
+
+/// Mixes coarser texels into finer ones; their share is `quarters`/4.
+#[inline(always)]
+fn towards_texels(fine: &mut [u8; 4 * LANES], coarse: &[u8; 4 * LANES], quarters: i32) {
+    match quarters {
+        1 => fine.iter_mut().zip(coarse).for_each(|(fine, coarse)| *fine = mean(mean(*fine, *coarse), *fine)),
+        2 => fine.iter_mut().zip(coarse).for_each(|(fine, coarse)| *fine = mean(*fine, *coarse)),
+        _ => fine.iter_mut().zip(coarse).for_each(|(fine, coarse)| *fine = mean(mean(*fine, *coarse), *coarse)),
     }
 }
 
@@ -483,7 +542,7 @@ fn copy_pairs(texels: &Texels<'_>, places: &Block, pairs: &mut [Pair]) {
 #[inline(never)]
 fn copy_pairs_around(texels: &Texels<'_>, mask: u32, places: &Block, pairs: &mut [Pair]) {
     for (pair, place) in pairs.iter_mut().zip(places) {
-        let next = (place & !mask) | (place + 1 & mask);
+        let next = (place & !mask) | ((place + 1) & mask);
         *pair = [texels.pair(*place)[0], texels.pair(next)[0]];
     }
 }

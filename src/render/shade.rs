@@ -76,83 +76,107 @@ impl Default for SideRoom {
     }
 }
 
-/// Colours of the rows from `first_row` to `first_row + count` of a column that sees the side of `hit`; at most [`RUN`]. What
-/// follows in `out` up to a whole number of blocks is overwritten, too.
-#[inline(always)]
-pub(super) fn shade_side(
-    scene: &Scene,
-    frame: &Frame,
-    hit: &Hit,
+/// The side of a wall or body as some rows of a column see it, with what they have in common.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Side<'a> {
+    hit: &'a Hit,
     direction: [f32; 2],
     first_row: usize,
     count: usize,
-    room: &mut SideRoom,
-    out: &mut [u32],
-) {
-    let material = &scene.materials[hit.surface as usize];
-    let eye = frame.params.camera_height;
-    // What the rows have in common: u, the step of v, the level of detail, and where the lamps stand.
-    let cosine = -(hit.normal[0] * direction[0] + hit.normal[1] * direction[1]);
-    let across = hit.near * frame.params.pixel_rad;
-    let slant = across / cosine.max(LEAST_COSINE);
-    let foot = hit.bottom.max(0.0);
-    let rows = &frame.rows[first_row..first_row + count];
-    let light = &mut room.light[..count];
-    light.fill(frame.params.ambient);
-    let at = hit.near;
-    let point = [at * direction[0], at * direction[1]];
-    if frame.params.corner_shade > 0.0 {
-        let walls = &frame.edges[..frame.params.wall_count as usize];
-        let nook = walls.iter().fold(0.0, |deepest: f32, e| deepest.max(depth_at_wall(frame, e, point, hit.normal)));
-        let reaches = |depth: f32| 1.0 - frame.params.corner_shade * depth;
-        for (light, row) in light.iter_mut().zip(rows) {
-            let z = eye + at * row.tan;
-            let edge = depth(frame, z).max(depth(frame, frame.params.room_height - z));
-            *light *= reaches(nook) * reaches(edge);
-        }
-    }
-    let glow = glow(frame, hit.surface);
-    if glow > 0.0 {
-        for light in light.iter_mut() {
-            *light += glow;
-        }
-    }
-    let (lamps, panes) = frame.lamps.split_at(frame.params.lamp_count as usize);
-    for lamp in lamps {
-        let to = [lamp.position[0] - point[0], lamp.position[1] - point[1]];
-        let facing = hit.normal[0] * to[0] + hit.normal[1] * to[1];
-        if facing > 0.0 {
-            let offset_squared = to[0] * to[0] + to[1] * to[1];
-            for (light, row) in light.iter_mut().zip(rows) {
-                *light += lit(lamp, offset_squared, eye + at * row.tan, facing);
-            }
-        }
-    }
-    for pane in panes {
-        let to = [pane.position[0] - point[0], pane.position[1] - point[1]];
-        let facing = hit.normal[0] * to[0] + hit.normal[1] * to[1];
-        let faced = -(pane.normal[0] * to[0] + pane.normal[1] * to[1]);
-        if facing > 0.0 && faced > 0.0 {
-            let (weight, offset_squared) = (pane.intensity * facing * faced, to[0] * to[0] + to[1] * to[1]);
-            for (light, row) in light.iter_mut().zip(rows) {
-                *light += lit_by_window(pane, weight, offset_squared, eye + at * row.tan);
-            }
-        }
-    }
-    if frame.params.equal_angle == 0 {
+    /// Its texture where the rows are even in the tangent of elevation; then all have one level of detail.
+    strip: Strip<'a>,
+    /// Length on it that a pixel covers sideways, m.
+    slant: f32,
+}
+
+impl<'a> Side<'a> {
+    /// The rows from `first_row` to `first_row + count` of a column that looks along `direction`; at most [`RUN`].
+    #[inline(always)]
+    pub fn new(scene: &'a Scene, frame: &'a Frame, hit: &'a Hit, direction: [f32; 2], first_row: usize, count: usize) -> Self {
+        let material = &scene.materials[hit.surface as usize];
+        let cosine = -(hit.normal[0] * direction[0] + hit.normal[1] * direction[1]);
+        let across = hit.near * frame.params.pixel_rad;
+        let slant = across / cosine.max(LEAST_COSINE);
         let level = level(material, strip_footprint(material, [slant, across]));
-        let v = eye + hit.near * frame.rows[0].tan - foot;
+        let v = frame.params.camera_height + hit.near * frame.rows[0].tan - hit.bottom.max(0.0);
         let strip = Strip::new(&scene.atlas, material, [hit.u, v, across], level, first_row);
-        let blocks = count.div_ceil(LANES);
-        strip.shade(&room.light.as_chunks().0[..blocks], &mut room.strip, &mut out.as_chunks_mut().0[..blocks]);
-    } else {
+        Self { hit, direction, first_row, count, strip, slant }
+    }
+
+    /// Asks for the texels.
+    #[inline(always)]
+    pub fn fetch(&self) {
+        self.strip.fetch(self.count);
+    }
+
+    /// Colours of the rows. What follows in `out` up to a whole number of blocks is overwritten, too.
+    #[inline(always)]
+    pub fn shade(&self, frame: &Frame, room: &mut SideRoom, out: &mut [u32]) {
+        self.light(frame, &mut room.light[..self.count]);
+        if frame.params.equal_angle == 0 {
+            let blocks = self.count.div_ceil(LANES);
+            let (light, out) = (room.light.as_chunks().0, out.as_chunks_mut().0);
+            self.strip.shade(&light[..blocks], &mut room.strip, &mut out[..blocks]);
+            return;
+        }
         // Steps and level of detail change from row to row.
-        let u = coordinate(hit.u, material, 0);
-        for ((colour, row), light) in out.iter_mut().zip(rows).zip(&*light) {
-            let high = across * row.stretch * row.stretch;
-            let level = level(material, footprint(material, [slant, high]));
-            let v = coordinate(eye + hit.near * row.tan - foot, material, 1);
-            *colour = shade_point(&scene.atlas, material, [u, v], level, *light);
+        let Strip { atlas, material, u, .. } = self.strip;
+        let (near, foot) = (self.hit.near, self.hit.bottom.max(0.0));
+        let rows = &frame.rows[self.first_row..self.first_row + self.count];
+        for ((colour, row), light) in out.iter_mut().zip(rows).zip(&room.light) {
+            let high = near * frame.params.pixel_rad * row.stretch * row.stretch;
+            let level = level(material, footprint(material, [self.slant, high]));
+            let v = coordinate(frame.params.camera_height + near * row.tan - foot, material, 1);
+            *colour = shade_point(atlas, material, [u, v], level, *light);
+        }
+    }
+
+    /// Light on the rows.
+    #[inline(always)]
+    fn light(&self, frame: &Frame, light: &mut [f32]) {
+        let Self { hit, direction, first_row, count, .. } = *self;
+        let eye = frame.params.camera_height;
+        let rows = &frame.rows[first_row..first_row + count];
+        light.fill(frame.params.ambient);
+        let at = hit.near;
+        let point = [at * direction[0], at * direction[1]];
+        if frame.params.corner_shade > 0.0 {
+            let walls = &frame.edges[..frame.params.wall_count as usize];
+            let nook = walls.iter().fold(0.0, |deepest: f32, e| deepest.max(depth_at_wall(frame, e, point, hit.normal)));
+            let reaches = |depth: f32| 1.0 - frame.params.corner_shade * depth;
+            for (light, row) in light.iter_mut().zip(rows) {
+                let z = eye + at * row.tan;
+                let edge = depth(frame, z).max(depth(frame, frame.params.room_height - z));
+                *light *= reaches(nook) * reaches(edge);
+            }
+        }
+        let glow = glow(frame, hit.surface);
+        if glow > 0.0 {
+            for light in light.iter_mut() {
+                *light += glow;
+            }
+        }
+        let (lamps, panes) = frame.lamps.split_at(frame.params.lamp_count as usize);
+        for lamp in lamps {
+            let to = [lamp.position[0] - point[0], lamp.position[1] - point[1]];
+            let facing = hit.normal[0] * to[0] + hit.normal[1] * to[1];
+            if facing > 0.0 {
+                let offset_squared = to[0] * to[0] + to[1] * to[1];
+                for (light, row) in light.iter_mut().zip(rows) {
+                    *light += lit(lamp, offset_squared, eye + at * row.tan, facing);
+                }
+            }
+        }
+        for pane in panes {
+            let to = [pane.position[0] - point[0], pane.position[1] - point[1]];
+            let facing = hit.normal[0] * to[0] + hit.normal[1] * to[1];
+            let faced = -(pane.normal[0] * to[0] + pane.normal[1] * to[1]);
+            if facing > 0.0 && faced > 0.0 {
+                let (weight, offset_squared) = (pane.intensity * facing * faced, to[0] * to[0] + to[1] * to[1]);
+                for (light, row) in light.iter_mut().zip(rows) {
+                    *light += lit_by_window(pane, weight, offset_squared, eye + at * row.tan);
+                }
+            }
         }
     }
 }
@@ -161,6 +185,16 @@ pub(super) fn shade_side(
 #[inline(always)]
 fn glow(frame: &Frame, surface: u32) -> f32 {
     surface.checked_sub(2 + frame.params.wall_count).map_or(0.0, |k| frame.bodies[k as usize].glow)
+}
+
+/// A row of the picture that sees a horizontal surface.
+#[derive(Clone, Copy)]
+pub(super) struct Sight<'a> {
+    pub scene: &'a Scene,
+    pub frame: &'a Frame,
+    pub row: &'a Row,
+    /// Horizontal distance at which it is met, m.
+    pub t: f32,
 }
 
 /// A horizontal surface: floor, ceiling, or the top or underside of a body.
@@ -203,15 +237,12 @@ impl Plane {
         self.z
     }
 
-    /// Colours of some columns of a row that sees it, at horizontal distance `t`: those that have a bit in `wanted`.
+    /// Colours of some columns of a row that sees it, those that have a bit in `wanted`; they look along `x` and `y`.
     #[inline(always)]
     pub fn shade(
         &self,
-        scene: &Scene,
-        frame: &Frame,
+        Sight { scene, frame, row, t }: Sight<'_>,
         [x, y]: [&[f32; POINTS]; 2],
-        t: f32,
-        row: &Row,
         wanted: u64,
         room: &mut PointRoom,
         out: &mut [u32; POINTS],

@@ -81,7 +81,7 @@ fn strip(panorama: &Panorama, rgb: Vec<u8>) -> Option<RgbImage> {
 
 /// Colour of a range as a share of the farthest one; nothing is black.
 fn range_colour(share: f32) -> [u8; 3] {
-    if !(share > 0.0) {
+    if share <= 0.0 || share.is_nan() {
         return [0; 3];
     }
     // Near things differ in small steps: the root gives them more of the colours.
@@ -98,7 +98,7 @@ fn instance_colour(id: u16) -> [u8; 3] {
     }
     // Hues by the golden section, in two shades.
     let hue = (0.618_034 * f32::from(id)).fract() * 6.0;
-    let value = if id % 2 == 0 { 235.0 } else { 165.0 };
+    let value = if id.is_multiple_of(2) { 235.0 } else { 165.0 };
     [5.0_f32, 3.0, 1.0].map(|offset| {
         let k = (offset + hue) % 6.0;
         (value * (1.0 - 0.65 * k.min(4.0 - k).clamp(0.0, 1.0)) + 0.5) as u8

@@ -56,7 +56,7 @@ pub fn run(args: &RenderArgs, context: &Context, world: &World, path: &Path) -> 
     let mut renderer = render::create(args.renderer)?;
     let bodies = world.body_poses();
     let views: Vec<_> = frames.iter().map(|f| View { projection, robot: f.robot, bodies: &bodies }).collect();
-    let camera = Camera::new(take.optics.clone());
+    let camera = Camera::new(take.optics);
     let bar = context.progress(Some(frames.len() as u64))?;
     renderer.render_batch(&take.scene, &views, &mut |first, panoramas| {
         if context.is_stopped() {

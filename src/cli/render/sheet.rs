@@ -44,7 +44,7 @@ pub fn run(args: &RenderArgs, context: &Context, world: &World, pose: Option<Pos
     let out = args.out.clone().unwrap_or_else(|| default_folder(&["render", &world.spec.name, "sheet"]));
     let mut folder = OutputFolder::open(&out, "render --sheet", FILES)?;
     let mut renderer = render::create(args.renderer)?;
-    let mut camera = Camera::new(take.optics.clone());
+    let mut camera = Camera::new(take.optics);
     let (mut sheet, mut panorama, bodies) = (Sheet::new(), Panorama::empty(), world.body_poses());
     for robot in &poses {
         let view = View { projection: take.projection, robot: *robot, bodies: &bodies };

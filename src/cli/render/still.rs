@@ -42,7 +42,7 @@ pub fn run(args: &RenderArgs, context: &Context, world: &World, pose: Pose) -> R
     let mut renderer = render::create(args.renderer)?;
     let mut panorama = Panorama::empty();
     let view = View { projection: take.projection, robot: pose, bodies: &world.body_poses() };
-    let mut camera = Camera::new(take.optics.clone());
+    let mut camera = Camera::new(take.optics);
     camera.take(renderer.as_mut(), &take.scene, &view, Twist::default(), Seed(args.seed), &mut panorama)?;
 
     let meta = StillMeta { pose: pose.into(), meta: Meta::new(args, world, &take, renderer.info()) };
