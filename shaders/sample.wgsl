@@ -29,7 +29,7 @@ fn strip_footprint(material: Material, covered_m: vec2<f32>) -> f32 {
 
 fn level(material: Material, footprint: f32) -> i32 {
     let logarithm = (bitcast<i32>(footprint) - bitcast<i32>(1.0)) >> 15u;
-    return clamp(logarithm, 0, 256 * i32(material.log2_size));
+    return (clamp(logarithm, 0, 256 * i32(material.log2_size)) + 32) & -64;
 }
 
 fn within_tile(length_m: f32, material: Material, scale: f32) -> f32 {
@@ -51,21 +51,27 @@ fn on_level(coordinate: i32, level: u32) -> i32 {
     return (coordinate >> (8u + level)) - 128;
 }
 
-// Red and blue, then green and alpha, 16 bits each.
-fn unpack(texel: u32) -> vec2<u32> {
-    return vec2<u32>(texel, texel >> 8u) & vec2<u32>(0x00ff00ffu);
+// The means of four bytes, rounded up.
+fn mean(a: u32, b: u32) -> u32 {
+    return (a | b) - (((a ^ b) >> 1u) & 0x7f7f7f7fu);
 }
 
-fn mix_channels(a: vec2<u32>, b: vec2<u32>, weight: u32) -> vec2<u32> {
-    return ((a * (256u - weight) + b * weight + vec2<u32>(0x00800080u)) >> vec2<u32>(8u)) & vec2<u32>(0x00ff00ffu);
+// The four channels of a texel.
+fn unpack(texel: u32) -> vec4<u32> {
+    return vec4<u32>(texel, texel >> 8u, texel >> 16u, texel >> 24u) & vec4<u32>(255u);
 }
 
-// A level with u fixed: two lines of texels along v, and the weight of the second.
+// The sum of two texels with weights that make up 256.
+fn weigh(a: vec4<u32>, b: vec4<u32>, weight: u32) -> vec4<u32> {
+    return a * (256u - weight) + b * weight;
+}
+
+// A level with u fixed: two lines of texels along v, and the share in 1/16 of the second.
 struct Lines {
     first: u32,
     second: u32,
+    mask: u32,
     weight: u32,
-    level: u32,
 }
 
 fn new_lines(material: Material, level: u32, u: i32) -> Lines {
@@ -74,41 +80,88 @@ fn new_lines(material: Material, level: u32, u: i32) -> Lines {
     let mask = (1u << shift) - 1u;
     let at = on_level(u, level);
     let line = u32(at >> 8u);
-    return Lines(base + ((line & mask) << shift), base + (((line + 1u) & mask) << shift), u32(at & 255), level);
+    return Lines(base + ((line & mask) << shift), base + (((line + 1u) & mask) << shift), mask, u32(at >> 4u) & 15u);
 }
 
-fn sample_lines(lines: Lines, log2_size: u32, v: i32) -> vec2<u32> {
-    let mask = (1u << (log2_size - lines.level)) - 1u;
-    let at = on_level(v, lines.level);
-    let low = u32(at >> 8u) & mask;
-    let high = (low + 1u) & mask;
-    let near = mix_channels(unpack(atlas[lines.first + low]), unpack(atlas[lines.second + low]), lines.weight);
-    let far = mix_channels(unpack(atlas[lines.first + high]), unpack(atlas[lines.second + high]), lines.weight);
-    return mix_channels(near, far, u32(at & 255));
+// A texel of the lines, mixed by means alone.
+fn texel(lines: Lines, place: i32) -> u32 {
+    let at = u32(place) & lines.mask;
+    let a = atlas[lines.first + at];
+    let b = atlas[lines.second + at];
+    let w = mean(a, select(a, b, (lines.weight & 1u) != 0u));
+    let x = mean(w, select(a, b, (lines.weight & 2u) != 0u));
+    let y = mean(x, select(a, b, (lines.weight & 4u) != 0u));
+    return mean(y, select(a, b, (lines.weight & 8u) != 0u));
 }
 
+// A texel mixed with the coarser level, which is three parts of its own texel there and one of the nearer neighbour.
+fn towards(fine: u32, own: u32, neighbour: u32, quarters: u32) -> u32 {
+    let coarse = mean(own, mean(own, neighbour));
+    let half = mean(fine, coarse);
+    return select(mean(half, select(coarse, fine, quarters == 1u)), half, quarters == 2u);
+}
+
+// A texture with u and level of detail fixed.
 struct Strip {
-    log2_size: u32,
     fine: Lines,
     coarse: Lines,
-    weight: u32,
+    level: u32,
+    quarters: u32,
     v: i32,
     step: i32,
 }
 
-// A texture with u and level of detail fixed.
 fn new_strip(material: Material, u: i32, v: i32, step: i32, level: i32) -> Strip {
     let fine = u32(level >> 8u);
     let coarse = min(fine + 1u, material.log2_size);
-    let weight = u32(level & 255);
-    return Strip(material.log2_size, new_lines(material, fine, u), new_lines(material, coarse, u), weight, v, step);
+    return Strip(new_lines(material, fine, u), new_lines(material, coarse, u), fine, u32(level >> 6u) & 3u, v, step);
 }
 
-fn sample_strip(strip: Strip, row: u32) -> vec2<u32> {
-    let v = strip.v + strip.step * i32(row);
-    let fine = sample_lines(strip.fine, strip.log2_size, v);
-    if strip.weight == 0u {
+// Colour in 1/256.
+fn sample_strip(strip: Strip, row: u32) -> vec4<u32> {
+    let at = on_level(strip.v + strip.step * i32(row), strip.level);
+    let place = at >> 8u;
+    var near = texel(strip.fine, place);
+    var far = texel(strip.fine, place + 1);
+    if strip.quarters != 0u {
+        let half = place >> 1u;
+        let own = texel(strip.coarse, half);
+        let next = texel(strip.coarse, half + 1);
+        if (place & 1) == 0 {
+            near = towards(near, own, texel(strip.coarse, half - 1), strip.quarters);
+            far = towards(far, own, next, strip.quarters);
+        } else {
+            near = towards(near, own, next, strip.quarters);
+            far = towards(far, next, own, strip.quarters);
+        }
+    }
+    return weigh(unpack(near), unpack(far), u32(at & 255));
+}
+
+// One level of a texture at a point, in 1/256.
+fn sample_level(material: Material, u: i32, v: i32, level: u32) -> vec4<u32> {
+    let base = level_base(material, level);
+    let shift = material.log2_size - level;
+    let mask = (1u << shift) - 1u;
+    let x = on_level(u, level);
+    let y = on_level(v, level);
+    let first = base + ((u32(x >> 8u) & mask) << shift);
+    let second = base + ((u32((x >> 8u) + 1) & mask) << shift);
+    let low = u32(y >> 8u) & mask;
+    let high = (low + 1u) & mask;
+    let weight = u32(x & 255);
+    let near = (weigh(unpack(atlas[first + low]), unpack(atlas[second + low]), weight) + vec4<u32>(128u)) >> vec4<u32>(8u);
+    let far = (weigh(unpack(atlas[first + high]), unpack(atlas[second + high]), weight) + vec4<u32>(128u)) >> vec4<u32>(8u);
+    return weigh(near, far, u32(y & 255));
+}
+
+// A texture at a point, in 1/256.
+fn sample_point(material: Material, u: i32, v: i32, level: i32) -> vec4<u32> {
+    let fine = sample_level(material, u, v, u32(level >> 8u));
+    let quarters = u32(level >> 6u) & 3u;
+    if quarters == 0u {
         return fine;
     }
-    return mix_channels(fine, sample_lines(strip.coarse, strip.log2_size, v), strip.weight);
+    let coarse = sample_level(material, u, v, u32(level >> 8u) + 1u);
+    return fine - (fine >> vec4<u32>(2u)) * quarters + (coarse >> vec4<u32>(2u)) * quarters;
 }

@@ -58,11 +58,10 @@ fn glow_of(surface: u32) -> f32 {
     return bodies[surface - 2u - params.wall_count].glow;
 }
 
-// Colour times light, packed with red in the lowest byte; opaque. Light is rounded to 1/4096, at most 16.
-fn light_up(colour: vec2<u32>, light: f32) -> u32 {
+// Colour in 1/256 times light, packed with red in the lowest byte; opaque. Light is rounded to 1/4096, at most 16.
+fn light_up(colour: vec4<u32>, light: f32) -> u32 {
     let factor = u32(round_small(min(light * 4096.0, 65535.0)));
-    let channels = vec4<u32>(colour & vec2<u32>(0xffffu), colour >> vec2<u32>(16u));
-    let lit = min(((channels * 16u + 8u) * factor) >> vec4<u32>(16u), vec4<u32>(255u));
+    let lit = min((((colour * factor) >> vec4<u32>(16u)) + vec4<u32>(8u)) >> vec4<u32>(4u), vec4<u32>(255u));
     return lit.x | (lit.y << 8u) | (lit.z << 16u) | 0xff000000u;
 }
 
@@ -126,7 +125,7 @@ fn shade_side(side: Side, row: u32) -> u32 {
     let high = side.near * params.pixel_rad * rows[row].stretch * rows[row].stretch;
     let detail = level(side.material, footprint(side.material, vec2<f32>(side.slant, high)));
     let v = coordinate(z - side.foot, side.material, side.material.texels_per_m.y);
-    return light_up(sample_strip(new_strip(side.material, side.u, v, 0, detail), 0u), light);
+    return light_up(sample_point(side.material, side.u, v, detail), light);
 }
 
 struct Plane {
@@ -185,5 +184,5 @@ fn shade_plane(plane: Plane, direction: vec2<f32>, t: f32, row: Row) -> u32 {
             light += lit_by_window(lamps[k], weight, dot(to, to), plane.z);
         }
     }
-    return light_up(sample_strip(new_strip(plane.material, u, v, 0, detail), 0u), light);
+    return light_up(sample_point(plane.material, u, v, detail), light);
 }

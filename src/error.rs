@@ -83,6 +83,12 @@ pub enum Error {
         /// The codec's reason.
         source: image::ImageError,
     },
+    /// There is not enough memory.
+    #[error("no memory for a picture: {bytes} bytes are not to be had")]
+    Memory {
+        /// What was asked for.
+        bytes: usize,
+    },
     /// Worker threads could not be started.
     #[error("cannot start worker threads: {0}")]
     Threads(String),

@@ -9,6 +9,7 @@ use std::f64::consts::TAU;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::error::{Error, Result};
 use crate::geometry::{atan2, sin_cos, wrap};
 
 /// Instance id of the floor.
@@ -122,6 +123,31 @@ impl Panorama {
     pub fn black(projection: Projection) -> Self {
         let n = projection.pixels();
         Self { projection, rgba: vec![0; 4 * n], range_m: vec![0.0; n], instance: vec![0; n] }
+    }
+
+    /// A panorama without pixels, for [`Panorama::reshape`].
+    #[must_use]
+    pub fn empty() -> Self {
+        Self::black(Projection::new(0, 0))
+    }
+
+    /// Makes room for another projection; what the pixels show afterwards is left open.
+    ///
+    /// # Errors
+    /// [`Error::Memory`] when there is no room for so many.
+    pub fn reshape(&mut self, projection: Projection) -> Result<()> {
+        fn resize<T: Default + Clone>(values: &mut Vec<T>, count: usize) -> Result<()> {
+            let bytes = count * size_of::<T>();
+            values.try_reserve_exact(count.saturating_sub(values.len())).map_err(|_| Error::Memory { bytes })?;
+            values.resize(count, T::default());
+            Ok(())
+        }
+        let pixels = projection.pixels();
+        resize(&mut self.rgba, 4 * pixels)?;
+        resize(&mut self.range_m, pixels)?;
+        resize(&mut self.instance, pixels)?;
+        self.projection = projection;
+        Ok(())
     }
 
     /// Luma of every pixel (BT.601 weights), row-major, 0 to 255.

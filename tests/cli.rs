@@ -477,3 +477,44 @@ fn the_physics_report_holds_its_closed_forms() {
     }
     assert!(page.contains("| 0 rises |"), "{page}");
 }
+
+#[test]
+fn a_trajectory_becomes_a_film_and_a_sheet() {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
+    write("way.csv", "t_s,x_m,y_m,heading_rad,v_cmd\n0,3,3,0,0.1\n0.1,3.1,3,0.1,0.1\n0.2,3.2,3,0.2,0.1\n");
+    let common = ["render", LAB, "--size", "128x16", "--renderer", "cpu", "--trajectory"];
+    let film = |file: &str, more: &[&str]| run(folder.path(), &[&common[..], &[file], more].concat());
+    let output = film("way.csv", &["--out", "film", "--json"]);
+    assert_done(&output);
+    let meta: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(meta["frames"][2]["pose"]["x_m"], 3.2);
+    let held = |name: &str| folder.path().join("film").join(name);
+    let colours = |name: &str| image::open(held(name)).unwrap().to_rgb8().into_raw();
+    assert_ne!(colours("rgb-000000.png"), colours("rgb-000002.png"));
+    // A frame is what `--pose` gives, and a shorter film leaves none of the longer one.
+    let pose = format!("3.2,3,{}", 0.2_f64.to_degrees());
+    assert_done(&run(
+        folder.path(),
+        &["render", LAB, "--size", "128x16", "--renderer", "cpu", "--pose", &pose, "--out", "still"],
+    ));
+    let still = image::open(folder.path().join("still/range.png")).unwrap();
+    assert_eq!(image::open(held("range-000002.png")).unwrap(), still);
+    write("short.csv", "t,x,y,heading\n0,3,3,0\n");
+    assert_done(&film("short.csv", &["--out", "film"]));
+    assert!(held("instance-000000.png").exists() && !held("rgb-000001.png").exists());
+
+    assert_done(&film("way.csv", &["--sheet", "--out", "sheet"]));
+    let sheet = image::open(folder.path().join("sheet/sheet.png")).unwrap();
+    assert_eq!((sheet.width(), sheet.height()), (128, 3 * (3 * 16 + 2 * 2) + 2 * 10));
+    assert_done(&run(folder.path(), &["render", "crowd", "--sheet", "--size", "64x8", "--renderer", "cpu", "--out", "crowd"]));
+
+    write("lost.csv", "t,x,y,heading\n0,3,3,0\n1,30,3,0\n");
+    assert_fails(&film("lost.csv", &["--out", "lost"]), 2, &["lost.csv, frame 1", "outside the room"]);
+    write("bad.csv", "t,x,y,heading\n0,3,,0\n");
+    assert_fails(&film("bad.csv", &["--out", "lost"]), 1, &["line 2, y", "finite number"]);
+    assert_fails(&film("none.csv", &["--out", "lost"]), 1, &["none.csv"]);
+    assert!(!folder.path().join("lost").exists(), "a failure leaves no folder behind");
+    assert_fails(&run(folder.path(), &["render", LAB]), 2, &["--pose", "--trajectory", "--sheet", "--bench"]);
+    assert_fails(&run(folder.path(), &["render", LAB, "--bench"]), 2, &["--bench"]);
+}

@@ -90,9 +90,11 @@ pub enum Command {
     /// Hold the extractor against ground truth: a page of tables and charts
     #[command(after_help = EXIT_CODES)]
     VisionReport(VisionReportArgs),
-    /// Render one panorama with range and instance ids
+    /// Render panoramas with range and instance ids: of a pose, along a trajectory, or several on a sheet
     #[command(after_help = EXIT_CODES)]
-    Render(RenderArgs),
+    Render(Box<RenderArgs>),
+    /// How fast the renderer is and what it shows: a page with the speeds, and sheets of all worlds and presets
+    RenderReport(RenderReportArgs),
     /// Check, draw and describe world files
     World(WorldArgs),
 }
@@ -295,26 +297,50 @@ pub struct VisionReportArgs {
 
 /// Arguments of `render`.
 #[derive(Debug, clap::Args)]
+#[command(group = clap::ArgGroup::new("what").args(["pose", "trajectory", "sheet", "bench"]).multiple(true).required(true))]
 pub struct RenderArgs {
     /// World file, or the name of a built-in world
-    pub world: String,
+    #[arg(required_unless_present = "bench")]
+    pub world: Option<String>,
     /// Pose of the robot that carries the camera
     #[arg(long, value_name = "x,y,heading_deg", allow_hyphen_values = true, value_parser = pose)]
-    pub pose: Pose,
+    pub pose: Option<Pose>,
+    /// A panorama for each row of a table that begins with t_s,x_m,y_m,heading_rad, such as the trajectory.csv of `home`; the
+    /// robot stands still in each, and bodies stand where the world has them
+    #[arg(long, value_name = "FILE.csv", conflicts_with = "pose")]
+    pub trajectory: Option<PathBuf>,
+    /// One picture of several poses, each with range and instances in false colours: of the pose or some along the trajectory,
+    /// without those of home and places where a run may start
+    #[arg(long)]
+    pub sheet: bool,
+    /// Time the renderers of this machine: panoramas a second by size, instruction set and threads, beside the filling of memory
+    #[arg(long, conflicts_with_all = ["world", "pose", "trajectory", "sheet", "light", "camera", "seed", "size", "renderer", "out"])]
+    pub bench: bool,
     #[command(flatten)]
     pub look: LookArgs,
-    /// Seed of the camera's noise
+    /// Seed of the camera's noise, and of the places on a sheet
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub seed: u64,
-    /// Columns and rows of the panorama, 16x8 to 16384x4096 [default: the world's]
+    /// Columns and rows of the panorama, 16x8 to 16384x4096 [default: the world's; on a sheet 720x90]
     #[arg(long, value_name = "WxH", value_parser = size)]
     pub size: Option<(u32, u32)>,
     /// What renders
     #[arg(long, default_value = "auto", value_parser = choice(RENDERERS))]
     pub renderer: RendererChoice,
-    /// Folder for the results [default: results/runs/render-WORLD]
+    /// Folder for the results [default: results/runs/render-WORLD, with -trajectory or -sheet]
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
+}
+
+/// Arguments of `render-report`.
+#[derive(Debug, clap::Args)]
+pub struct RenderReportArgs {
+    /// Seconds that go into each figure
+    #[arg(long, value_name = "S", default_value = "2", allow_negative_numbers = true, value_parser = positive)]
+    pub seconds: f64,
+    /// Folder for the page
+    #[arg(long, value_name = "DIR", default_value = "results/rendering")]
+    pub out: PathBuf,
 }
 
 /// Arguments of `world`.

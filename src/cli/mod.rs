@@ -12,6 +12,7 @@ mod home;
 mod observability;
 mod physics_report;
 mod render;
+mod render_report;
 mod reproduce;
 mod robustness;
 mod vision_report;
@@ -45,6 +46,7 @@ pub fn run(args: Args) -> Result<Verdict> {
         Command::Reproduce(args) => reproduce::run(&args, &context),
         Command::Render(args) => render::run(&args, &context),
         Command::VisionReport(args) => vision_report::run(&args, &context),
+        Command::RenderReport(args) => render_report::run(&args, &context),
         Command::World(args) => world::run(&args, &context),
     }
 }

@@ -1,28 +1,31 @@
 //! The renderer that needs no graphics adapter. The twin of `shaders/panorama.wgsl`.
 //!
-//! The picture is cut into bands of rows, which threads share, and bands into tiles of a few columns, which fit into the
-//! nearest cache. In a tile each column's hits claim rows by distance. Runs of rows that show the same side are then shaded
-//! down the column, where u and level of detail stay the same; runs of columns that show the same horizontal surface along
-//! the row, where distance and level of detail do. The picture does not depend on the number of threads, since no pixel
-//! depends on how the work is cut.
+//! First each column is laid out in runs of rows that show the same face (`hits`, `spans`). Then the picture is cut into bands
+//! of rows, which threads share, and whose colours fit into the second cache. In a band upright faces are shaded down their
+//! columns, where u and level of detail stay the same; then horizontal ones along the rows, where distance and level of detail
+//! do, as row after row is put into the picture. No pixel depends on how the work is cut, nor on the number of threads.
 
 use std::ops::Range;
+use std::sync::{Mutex, PoisonError};
 
 use rayon::prelude::*;
 
-use super::columns::{Face, Hit};
+use super::columns::Face;
 use super::frame::{FAR, Frame, Row};
 use super::hits::ColumnHits;
-use super::sample::RUN;
-use super::shade::{Plane, shade_side};
-use super::{Renderer, RendererInfo, Scene, View};
+use super::sample::{LANES, POINTS, PointRoom, RUN};
+use super::shade::{Plane, Side, SideRoom, Sight};
+use super::spans::{NOTHING, Spans};
+use super::{InstructionSet, Renderer, RendererInfo, Scene, View};
 use crate::error::Result;
 use crate::panorama::Panorama;
 
 /// Most rows in a band: the unit of work of a thread.
 const BAND: usize = RUN;
-/// Columns of a tile.
-const TILE: usize = 32;
+/// Most pixels in a band that is higher than [`LEAST_ROWS`]: low bands cut columns short, high ones leave the second cache.
+const BAND_PIXELS: usize = 384 << 10;
+/// Rows of a band of a very wide picture.
+const LEAST_ROWS: usize = 16;
 /// Colour where there is nothing.
 const VOID: u32 = 0xff00_0000;
 
@@ -33,25 +36,55 @@ type BandBuffers<'a> = (usize, ((&'a mut [u8], &'a mut [f32]), &'a mut [u16]));
 #[derive(Debug)]
 pub struct CpuRenderer {
     info: RendererInfo,
+    instructions: InstructionSet,
+    /// Those that are idle; there are as many as pictures were ever rendered at once.
+    painters: Mutex<Vec<Painter>>,
+}
+
+/// What it takes to render a picture. Its buffers grow with the first one.
+#[derive(Debug, Default)]
+struct Painter {
     frame: Frame,
     hits: ColumnHits,
+    spans: Spans,
+    desks: Mutex<Vec<Desk>>,
 }
 
 impl CpuRenderer {
-    /// A renderer; its buffers grow with the first picture.
+    /// A renderer on the widest instruction set at hand; its buffers grow with the first picture.
     #[must_use]
     pub fn new() -> Self {
-        let info = RendererInfo { kind: "cpu".to_owned(), adapter: instruction_set().to_owned(), driver: String::new() };
-        Self { info, frame: Frame::new(), hits: ColumnHits::default() }
+        Self::with(InstructionSet::best())
+    }
+
+    /// A renderer on an instruction set of choice.
+    ///
+    /// # Errors
+    /// When this processor does not have it.
+    pub fn on(instructions: InstructionSet) -> Result<Self> {
+        instructions.available().map(Self::with)
+    }
+
+    fn with(instructions: InstructionSet) -> Self {
+        let adapter = format!("{} with {instructions} instructions", std::env::consts::ARCH);
+        let info = RendererInfo { kind: "cpu".to_owned(), adapter, driver: String::new() };
+        Self { info, instructions, painters: Mutex::new(Vec::new()) }
+    }
+
+    /// Renders a view; `share` its bands with the other threads or paint them all in this one.
+    fn paint(&self, scene: &Scene, view: &View<'_>, out: &mut Panorama, share: bool) -> Result<()> {
+        with_idle(&self.painters, |painter| painter.paint(self.instructions, scene, view, out, share))
     }
 }
 
-fn instruction_set() -> &'static str {
-    #[cfg(target_arch = "x86_64")]
-    if is_x86_feature_detected!("avx2") {
-        return "x86_64 with AVX2";
-    }
-    std::env::consts::ARCH
+/// Does something with one of the idle things, or a new one.
+fn with_idle<I: Default, T>(things: &Mutex<Vec<I>>, work: impl FnOnce(&mut I) -> T) -> T {
+    let idle = || things.lock().unwrap_or_else(PoisonError::into_inner);
+    let thing = idle().pop();
+    let mut thing = thing.unwrap_or_default();
+    let result = work(&mut thing);
+    idle().push(thing);
+    result
 }
 
 impl Default for CpuRenderer {
@@ -62,41 +95,70 @@ impl Default for CpuRenderer {
 
 impl Renderer for CpuRenderer {
     fn render(&mut self, scene: &Scene, view: &View<'_>, out: &mut Panorama) -> Result<()> {
+        // Inside a pool the caller already spreads pictures over the cores.
+        let alone = rayon::current_thread_index().is_none();
+        self.paint(scene, view, out, alone)
+    }
+
+    fn render_group(&mut self, scene: &Scene, views: &[View<'_>], out: &mut [Panorama]) -> Result<()> {
+        assert_eq!(views.len(), out.len(), "a place for each view");
+        if let ([view], [out]) = (views, &mut *out) {
+            return self.paint(scene, view, out, true);
+        }
+        views.par_iter().zip(out).with_max_len(1).try_for_each(|(view, out)| self.paint(scene, view, out, false))
+    }
+
+    fn info(&self) -> &RendererInfo {
+        &self.info
+    }
+}
+
+impl Painter {
+    /// Renders a view; `share` its bands with the other threads or paint them all in this one.
+    fn paint(
+        &mut self,
+        instructions: InstructionSet,
+        scene: &Scene,
+        view: &View<'_>,
+        out: &mut Panorama,
+        share: bool,
+    ) -> Result<()> {
         self.frame.prepare(scene, view)?;
         self.hits.find(&self.frame);
-        let pixels = view.projection.pixels();
-        out.projection = view.projection;
-        out.rgba.resize(4 * pixels, 0);
-        out.range_m.resize(pixels, 0.0);
-        out.instance.resize(pixels, 0);
-        let (frame, hits) = (&self.frame, &self.hits);
+        self.spans.find(&self.frame, &self.hits);
+        out.reshape(view.projection)?;
         let (width, height) = (view.projection.width as usize, view.projection.height as usize);
-        let rows = height.div_ceil(height.div_ceil(BAND));
+        let most = (BAND_PIXELS / width).clamp(LEAST_ROWS, BAND);
+        let most = if share { most.min(height.div_ceil(rayon::current_num_threads())) } else { most };
+        let rows = height.div_ceil(height.div_ceil(most));
         let size = rows * width;
         let paint_band = |(k, ((rgba, range), instance)): BandBuffers<'_>| {
-            paint(Band { scene, frame, hits, first_row: k * rows, rgba, range, instance });
+            with_idle(&self.desks, |desk| {
+                let (frame, hits, spans) = (&self.frame, &self.hits, &self.spans);
+                let paint = match instructions {
+                    InstructionSet::Portable => paint,
+                    InstructionSet::Avx2 => paint_avx2,
+                    InstructionSet::Avx512 => paint_avx512,
+                };
+                paint(Band { scene, frame, hits, spans, first_row: k * rows, rgba, range, instance }, desk);
+            });
         };
-        // Inside a pool the caller already spreads pictures over the cores.
-        if rayon::current_thread_index().is_some() {
-            out.rgba
-                .chunks_mut(4 * size)
-                .zip(out.range_m.chunks_mut(size))
-                .zip(out.instance.chunks_mut(size))
-                .enumerate()
-                .for_each(paint_band);
-        } else {
+        if share {
             out.rgba
                 .par_chunks_mut(4 * size)
                 .zip(out.range_m.par_chunks_mut(size))
                 .zip(out.instance.par_chunks_mut(size))
                 .enumerate()
                 .for_each(paint_band);
+        } else {
+            out.rgba
+                .chunks_mut(4 * size)
+                .zip(out.range_m.chunks_mut(size))
+                .zip(out.instance.chunks_mut(size))
+                .enumerate()
+                .for_each(paint_band);
         }
         Ok(())
-    }
-
-    fn info(&self) -> &RendererInfo {
-        &self.info
     }
 }
 
@@ -105,192 +167,248 @@ struct Band<'a> {
     scene: &'a Scene,
     frame: &'a Frame,
     hits: &'a ColumnHits,
+    spans: &'a Spans,
     first_row: usize,
     rgba: &'a mut [u8],
     range: &'a mut [f32],
     instance: &'a mut [u16],
 }
 
-/// Code of a face that a pixel shows: four times its surface's number, plus the face.
-fn code(surface: u32, face: Face) -> u32 {
-    4 * surface + face as u32
+/// Where a band is worked on.
+#[derive(Debug, Default)]
+struct Desk {
+    /// Colours, row by row, each a little longer than the picture's.
+    colours: Vec<u32>,
+    stride: usize,
+    /// Changes of what a column shows, and for each row the number of the first of them, from 1.
+    changes: Vec<Change>,
+    first_change: Vec<u32>,
+    levels: Vec<Level>,
+    /// What the columns show in the row at work.
+    now: Now,
+    columns: Columns,
+    side: SideRoom,
+    point: PointRoom,
 }
 
-/// Code of a pixel that would meet floor or ceiling beyond all distance. As an instance it becomes 0.
-const NOTHING: u32 = 4 * 0xffff;
+/// Colours of some columns, each from the top, and of what may be written after its end.
+#[derive(Debug)]
+struct Columns([[u32; RUN + 2 * LANES]; LANES]);
 
-/// The instance that a code stands for.
-#[inline(always)]
-fn instance(code: u32) -> u16 {
-    ((code >> 2) + 1) as u16
-}
-
-/// Whether a code is that of a horizontal surface.
-#[inline(always)]
-fn is_level(code: u32) -> bool {
-    code & 3 != 0
-}
-
-/// What the rows of one column see: how far away, horizontally, and which face.
-#[derive(Clone, Copy)]
-struct Column {
-    distance: [f32; BAND],
-    code: [u32; BAND],
-}
-
-/// The same for the columns of a tile, row by row, and the colours.
-struct Tile {
-    distance: [[f32; TILE]; BAND],
-    code: [[u32; TILE]; BAND],
-    colour: [[u32; TILE]; BAND],
-}
-
-/// Paints a band, on the widest vector unit at hand: results are the same on all.
-#[multiversion::multiversion(targets("x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"))]
-fn paint(mut band: Band<'_>) {
-    let band = &mut band;
-    let width = band.frame.params.width as usize;
-    let rows = &band.frame.rows[band.first_row..][..band.range.len() / width];
-    let mut room = Column { distance: [FAR; BAND], code: [NOTHING; BAND] };
-    for (k, row) in rows.iter().enumerate().filter(|(_, row)| row.plane < FAR) {
-        room.distance[k] = row.plane;
-        room.code[k] = if row.tan < 0.0 { code(0, Face::Top) } else { code(1, Face::Underside) };
+impl Default for Columns {
+    fn default() -> Self {
+        Self([[VOID; RUN + 2 * LANES]; LANES])
     }
-    let mut tile = Tile { distance: [[0.0; TILE]; BAND], code: [[0; TILE]; BAND], colour: [[VOID; TILE]; BAND] };
-    for first in (0..width).step_by(TILE) {
-        let columns = first..width.min(first + TILE);
-        for c in columns.clone() {
-            let mut column = room;
-            claim(band.frame, rows, band.hits.of(c), &mut column);
-            shade_sides(band, rows.len(), c, &column, &mut tile, c - first);
+}
+
+/// A column shows another face from some row on.
+#[derive(Debug, Clone, Copy)]
+struct Change {
+    /// Number of the next change of the same row; 0 where there is none.
+    next: u32,
+    column: u32,
+    instance: u16,
+    /// Distance is `near`, and `height` times the inverse tangent of the row, and `room` times the distance of floor or ceiling.
+    near: f32,
+    height: f32,
+    room: f32,
+}
+
+/// What columns show in a row; see [`Change`].
+#[derive(Debug, Default)]
+struct Now {
+    near: Vec<f32>,
+    height: Vec<f32>,
+    room: Vec<f32>,
+    instance: Vec<u16>,
+    /// Directions of the columns, with some more at the end to make up whole groups.
+    directions: [Vec<f32>; 2],
+}
+
+/// Where a horizontal surface is seen in a group of columns: a bit for each of them, row after row.
+#[derive(Debug)]
+struct Level {
+    group: usize,
+    surface: u32,
+    face: Face,
+    rows: Range<usize>,
+    masks: Vec<u64>,
+}
+
+impl Desk {
+    /// Clears the desk for a band of so many rows.
+    fn prepare(&mut self, frame: &Frame, rows: usize) {
+        let width = frame.params.width as usize;
+        let whole = width.next_multiple_of(POINTS);
+        // Rows must not all fall into the same places of the cache, which repeat every 4 KiB.
+        self.stride = whole + LANES;
+        self.colours.resize(rows * self.stride, VOID);
+        self.changes.clear();
+        self.levels.clear();
+        self.first_change.clear();
+        self.first_change.resize(rows, 0);
+        let now = &mut self.now;
+        for values in [&mut now.near, &mut now.height, &mut now.room] {
+            values.resize(width, 0.0);
         }
-        shade_planes(band, rows, columns.clone(), &mut tile);
-        write(band, rows, columns, &tile);
+        now.instance.resize(width, 0);
+        for (axis, values) in now.directions.iter_mut().enumerate() {
+            values.clear();
+            values.extend(frame.directions.iter().map(|d| d[axis]));
+            values.resize(whole, 0.0);
+        }
+    }
+
+    /// Puts the columns that were worked on into the rows, from column `first` on.
+    #[inline(always)]
+    fn turn(&mut self, rows: usize, first: usize) {
+        let columns = &self.columns.0;
+        for (r, places) in self.colours.chunks_exact_mut(self.stride).enumerate().take(rows.min(RUN)) {
+            if let Some(places) = places[first..].first_chunk_mut::<LANES>() {
+                for c in 0..LANES {
+                    places[c] = columns[c][r];
+                }
+            }
+        }
     }
 }
 
-/// Decides what each row of a column sees: of all faces that its ray meets, the nearest.
+/// Paints a band. Inlined into the functions below, all of it is compiled once for each instruction set; results are the same.
 #[inline(always)]
-fn claim(frame: &Frame, rows: &[Row], hits: &[Hit], column: &mut Column) {
-    let eye = frame.params.camera_height;
-    for hit in hits {
-        let side = code(hit.surface, Face::Side);
-        if hit.top >= FAR {
-            take(column, 0..rows.len(), |_| hit.near, side); // a wall
+fn paint(mut band: Band<'_>, desk: &mut Desk) {
+    let width = band.frame.params.width as usize;
+    let rows = band.range.len() / width;
+    desk.prepare(band.frame, rows);
+    let mut runs = Vec::new();
+    for first in (0..width).step_by(LANES) {
+        for column in first..width.min(first + LANES) {
+            lay_out(&band, desk, rows, column, &mut runs);
+        }
+        for run in runs.drain(..) {
+            let colours = &mut desk.columns.0[run.column % LANES][run.start..];
+            match &run.side {
+                Some(side) => side.shade(band.frame, &mut desk.side, colours),
+                None => colours[..run.count].fill(VOID),
+            }
+        }
+        desk.turn(rows, first);
+    }
+    for row in 0..rows {
+        show_row(&mut band, desk, row);
+    }
+}
+
+#[multiversion::multiversion(targets("x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"))]
+fn paint_avx2(band: Band<'_>, desk: &mut Desk) {
+    paint(band, desk);
+}
+
+/// The crate adds the other parts of AVX-512 that processors have on which it is fast.
+#[multiversion::multiversion(targets("x86_64+avx512f+avx2+bmi1+bmi2+lzcnt+popcnt"))]
+fn paint_avx512(band: Band<'_>, desk: &mut Desk) {
+    paint(band, desk);
+}
+
+/// Rows of a column to be shaded: they see an upright face, or nothing.
+struct Run<'a> {
+    column: usize,
+    start: usize,
+    count: usize,
+    side: Option<Side<'a>>,
+}
+
+/// Notes what a column shows. Texels of upright faces are asked for, so that they are there when the runs are shaded.
+#[inline(always)]
+fn lay_out<'a>(band: &Band<'a>, desk: &mut Desk, rows: usize, column: usize, runs: &mut Vec<Run<'a>>) {
+    let (frame, eye) = (band.frame, band.frame.params.camera_height);
+    let hits = band.hits.of(column);
+    for span in band.spans.of(column) {
+        let start = (span.start as usize).saturating_sub(band.first_row);
+        let end = (span.end as usize).saturating_sub(band.first_row).min(rows);
+        if start >= end {
             continue;
         }
-        // Rows look lower and lower, so that each condition holds from some row on or up to some row.
-        let below_top = rows.partition_point(|r| eye + hit.near * r.tan > hit.top);
-        let below_bottom = rows.partition_point(|r| eye + hit.near * r.tan >= hit.bottom);
-        take(column, below_top..below_bottom, |_| hit.near, side);
-        if hit.top < eye {
-            let from = rows.partition_point(|r| eye + hit.far * r.tan >= hit.top);
-            let top = |r: usize| (hit.top - eye) * rows[r].inverse_tan;
-            take(column, from..below_top, top, code(hit.surface, Face::Top));
-        } else if hit.bottom > eye {
-            let to = rows.partition_point(|r| eye + hit.far * r.tan > hit.bottom);
-            let underside = |r: usize| (hit.bottom - eye) * rows[r].inverse_tan;
-            take(column, below_bottom..to, underside, code(hit.surface, Face::Underside));
+        let hit = hits.get(usize::from(span.hit));
+        let (mut near, mut height, mut room) = (0.0, 0.0, 0.0);
+        match (span.face, hit) {
+            (Face::Side, Some(hit)) => near = hit.near,
+            (Face::Top, Some(hit)) => height = hit.top - eye,
+            (Face::Underside, Some(hit)) => height = hit.bottom - eye,
+            (_, None) => room = 1.0,
         }
-    }
-}
-
-/// Rows that see nothing nearer than `distance` show the face `code`.
-#[inline(always)]
-fn take(column: &mut Column, rows: Range<usize>, distance: impl Fn(usize) -> f32, code: u32) {
-    if rows.start >= rows.end {
-        return;
-    }
-    let places = column.distance[rows.clone()].iter_mut().zip(&mut column.code[rows.clone()]);
-    for (r, (d, c)) in rows.zip(places) {
-        let t = distance(r);
-        let nearer = t < *d;
-        *d = if nearer { t } else { *d };
-        *c = if nearer { code } else { *c };
-    }
-}
-
-/// Stores a column in its tile and shades its runs of rows that show the same side. Horizontal surfaces come later.
-#[inline(always)]
-fn shade_sides(band: &Band<'_>, rows: usize, c: usize, column: &Column, tile: &mut Tile, lane: usize) {
-    let codes = &column.code[..rows];
-    for r in 0..rows.min(BAND) {
-        tile.distance[r][lane % TILE] = column.distance[r];
-        tile.code[r][lane % TILE] = column.code[r];
-    }
-    let hits = band.hits.of(c);
-    let direction = band.frame.directions[c];
-    let mut colours = [VOID; RUN];
-    let mut start = 0;
-    while start < rows {
-        let one = codes[start];
-        let end = start + codes[start..].iter().position(|o| *o != one).unwrap_or(rows - start);
-        if !is_level(one) {
-            match hits.iter().find(|h| h.surface == one >> 2) {
-                Some(hit) => {
-                    let row = band.first_row + start;
-                    shade_side(band.scene, band.frame, hit, direction, row, end - start, &mut colours);
-                }
-                None => colours = [VOID; RUN],
+        let (next, instance) = (desk.first_change[start], (span.surface + 1) as u16);
+        desk.changes.push(Change { next, column: column as u32, instance, near, height, room });
+        desk.first_change[start] = desk.changes.len() as u32;
+        let count = end - start;
+        match (span.face, hit) {
+            (Face::Side, Some(hit)) => {
+                let side = Side::new(band.scene, frame, hit, frame.directions[column], band.first_row + start, count);
+                side.fetch();
+                runs.push(Run { column, start, count, side: Some(side) });
             }
-            for (places, colour) in tile.colour[start..end].iter_mut().zip(&colours) {
-                places[lane % TILE] = *colour;
-            }
-        }
-        start = end;
-    }
-}
-
-/// Shades the runs of columns that show the same horizontal surface, row by row.
-#[inline(always)]
-fn shade_planes(band: &Band<'_>, rows: &[Row], columns: Range<usize>, tile: &mut Tile) {
-    let count = columns.len();
-    let mut directions = [[0.0; TILE]; 2];
-    for (k, direction) in band.frame.directions[columns].iter().enumerate() {
-        (directions[0][k], directions[1][k]) = (direction[0], direction[1]);
-    }
-    // Rows below one another mostly show the same surface.
-    let mut plane = (NOTHING, Plane::new(band.scene, band.frame, 0, false));
-    for ((row, codes), (distances, colours)) in rows.iter().zip(&tile.code).zip(tile.distance.iter().zip(&mut tile.colour)) {
-        let mut start = 0;
-        while start < count {
-            let one = codes[start];
-            let end = start + codes[start..count].iter().position(|c| *c != one).unwrap_or(count - start);
-            if is_level(one) {
-                if plane.0 != one {
-                    plane = (one, Plane::new(band.scene, band.frame, one >> 2, one == code(one >> 2, Face::Underside)));
-                }
-                let t = distances[start];
-                let shaded = plane.1.shade(band.scene, band.frame, &directions, t, row, start..end);
-                colours[start..end].copy_from_slice(&shaded[start..end]);
-            }
-            start = end;
+            _ if span.surface == NOTHING => runs.push(Run { column, start, count, side: None }),
+            _ => note_level(desk, span.surface, span.face, start..end, column),
         }
     }
 }
 
-/// Copies a tile into the picture.
+/// Notes that rows of a column see a horizontal surface.
 #[inline(always)]
-fn write(band: &mut Band<'_>, rows: &[Row], columns: Range<usize>, tile: &Tile) {
-    let width = band.frame.params.width as usize;
-    let count = columns.len();
-    for (r, row) in rows.iter().enumerate() {
-        let range = tile.distance[r].map(|d| if d < FAR { d * row.stretch } else { 0.0 });
-        let instances = tile.code[r].map(instance);
-        let colours: &[u8; 4 * TILE] = bytemuck::cast_ref(&tile.colour[r]);
-        let at = r * width + columns.start;
-        let rgba = &mut band.rgba[4 * at..4 * (at + count)];
-        let ranges = &mut band.range[at..at + count];
-        let places = &mut band.instance[at..at + count];
-        if count == TILE {
-            // The lengths are known here, so that these are moves and no calls.
-            rgba.copy_from_slice(colours);
-            ranges.copy_from_slice(&range);
-            places.copy_from_slice(&instances);
-        } else {
-            rgba.copy_from_slice(&colours[..4 * count]);
-            ranges.copy_from_slice(&range[..count]);
-            places.copy_from_slice(&instances[..count]);
+fn note_level(desk: &mut Desk, surface: u32, face: Face, rows: Range<usize>, column: usize) {
+    let group = column / POINTS;
+    let mut of_group = desk.levels.iter().rev().take_while(|l| l.group == group);
+    let known = of_group.position(|l| l.surface == surface && l.face == face).map(|k| desk.levels.len() - 1 - k);
+    let k = known.unwrap_or_else(|| {
+        let masks = vec![0; desk.first_change.len()];
+        desk.levels.push(Level { group, surface, face, rows: rows.clone(), masks });
+        desk.levels.len() - 1
+    });
+    let level = &mut desk.levels[k];
+    level.rows = level.rows.start.min(rows.start)..level.rows.end.max(rows.end);
+    for mask in &mut level.masks[rows] {
+        *mask |= 1 << (column % POINTS);
+    }
+}
+
+/// Shades the horizontal surfaces of a row, and puts the row into the picture.
+#[inline(always)]
+fn show_row(band: &mut Band<'_>, desk: &mut Desk, number: usize) {
+    let frame = band.frame;
+    let width = frame.params.width as usize;
+    let row = &frame.rows[band.first_row + number];
+    let now = &mut desk.now;
+    let mut next = desk.first_change[number] as usize;
+    while let Some(change) = next.checked_sub(1).and_then(|k| desk.changes.get(k)) {
+        let column = change.column as usize;
+        (now.near[column], now.height[column], now.room[column]) = (change.near, change.height, change.room);
+        now.instance[column] = change.instance;
+        next = change.next as usize;
+    }
+    let colours = &mut desk.colours[number * desk.stride..][..desk.stride];
+    for level in desk.levels.iter().filter(|l| l.rows.contains(&number)) {
+        let columns = POINTS * level.group..POINTS * (level.group + 1);
+        let [x, y] = now.directions.each_ref().map(|d| d[columns.clone()].first_chunk());
+        if let (Some(x), Some(y), Some(out)) = (x, y, colours[columns].first_chunk_mut()) {
+            let plane = Plane::new(band.scene, frame, level.surface, level.face == Face::Underside);
+            let height = plane.height() - frame.params.camera_height;
+            let t = if level.surface < 2 { row.plane } else { height * row.inverse_tan };
+            let sight = Sight { scene: band.scene, frame, row, t };
+            plane.shade(sight, [x, y], level.masks[number], &mut desk.point, out);
         }
+    }
+    let places = width * number..width * (number + 1);
+    band.rgba[4 * places.start..4 * places.end].copy_from_slice(bytemuck::cast_slice(&colours[..width]));
+    band.instance[places.clone()].copy_from_slice(&now.instance);
+    show_ranges(*row, now, &mut band.range[places]);
+}
+
+/// The ranges of a row.
+#[inline(always)]
+fn show_ranges(row: Row, now: &Now, out: &mut [f32]) {
+    let count = out.len();
+    let (near, height, room) = (&now.near[..count], &now.height[..count], &now.room[..count]);
+    for k in 0..count {
+        let distance = near[k] + height[k] * row.inverse_tan + room[k] * row.plane;
+        out[k] = if distance < FAR { distance * row.stretch } else { 0.0 };
     }
 }

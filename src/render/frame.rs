@@ -138,6 +138,12 @@ pub(super) struct Frame {
     circle: Vec<Vector2<f64>>,
 }
 
+impl Default for Frame {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
 impl Frame {
     pub fn new() -> Self {
         Self {

@@ -1,9 +1,8 @@
 //! The renderer on a graphics adapter: one compute shader through wgpu.
 
+use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError, mpsc};
 use std::time::Duration;
-
-use wgpu::util::DeviceExt;
 
 use super::frame::Frame;
 use super::{Renderer, RendererInfo, Scene, View};
@@ -28,6 +27,8 @@ const PIXEL_BYTES: u64 = 12;
 /// Rows of an invocation on hardware, which wants thousands of invocations. A software adapter wants whole columns, to compute
 /// a column's hits once.
 const HARDWARE_ROWS: u32 = 16;
+/// Pictures under way at once: one is made, one is on its way back, one is prepared or read.
+const IN_FLIGHT: usize = 3;
 /// A picture that takes longer has failed.
 const TIMEOUT: Duration = Duration::from_secs(60);
 
@@ -131,7 +132,8 @@ impl Shared {
 
 /// The GPU renderer.
 ///
-/// All renderers of a process share one device. Each keeps its own buffers there, and the scene that it rendered last.
+/// All renderers of a process share one device. Each keeps its own buffers there, and the scene that it rendered last. When the
+/// device is lost, which is an error of the picture under way and of all later ones, a new renderer makes a new device.
 #[derive(Debug)]
 pub struct GpuRenderer {
     shared: Arc<Shared>,
@@ -142,11 +144,37 @@ pub struct GpuRenderer {
     edges: Table,
     bodies: Table,
     lamps: Table,
-    /// Materials and atlas of the scene of this id.
-    scene: Option<(u64, wgpu::Buffer, wgpu::Buffer)>,
+    materials: Table,
+    atlas: Table,
+    /// Whose materials and atlas they are.
+    scene: Option<u64>,
+    /// Places for pictures under way, used in turn.
+    slots: Vec<Slot>,
+}
+
+/// Where a picture is made and read back.
+#[derive(Debug)]
+struct Slot {
     picture: Table,
     readback: Table,
     bindings: Option<wgpu::BindGroup>,
+}
+
+impl Slot {
+    fn new() -> Self {
+        Self {
+            picture: Table::new("picture", wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC),
+            readback: Table::new("readback", wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST),
+            bindings: None,
+        }
+    }
+}
+
+/// A picture under way: the submission that makes it, and who hears when it can be read.
+struct Under {
+    submission: wgpu::SubmissionIndex,
+    arrived: mpsc::Receiver<std::result::Result<(), wgpu::BufferAsyncError>>,
+    bytes: u64,
 }
 
 impl GpuRenderer {
@@ -167,8 +195,7 @@ impl GpuRenderer {
     }
 
     fn on(shared: Arc<Shared>) -> Self {
-        let storage = wgpu::BufferUsages::STORAGE;
-        let input = storage | wgpu::BufferUsages::COPY_DST;
+        let input = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST;
         Self {
             shared,
             frame: Frame::new(),
@@ -178,10 +205,10 @@ impl GpuRenderer {
             edges: Table::new("edges", input),
             bodies: Table::new("bodies", input),
             lamps: Table::new("lamps", input),
+            materials: Table::new("materials", input),
+            atlas: Table::new("atlas", input),
             scene: None,
-            picture: Table::new("picture", storage | wgpu::BufferUsages::COPY_SRC),
-            readback: Table::new("readback", wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST),
-            bindings: None,
+            slots: (0..IN_FLIGHT).map(|_| Slot::new()).collect(),
         }
     }
 
@@ -205,8 +232,8 @@ impl GpuRenderer {
         Ok(())
     }
 
-    /// Puts scene, tables and room for the picture on the device.
-    fn upload(&mut self, scene: &Scene, bytes: u64) {
+    /// Puts scene and tables on the device. What is written here reaches it after the pictures that are under way.
+    fn upload(&mut self, scene: &Scene) {
         let (device, queue, frame) = (&self.shared.device, &self.shared.queue, &self.frame);
         let mut moved = false;
         moved |= self.params.write(device, queue, bytemuck::bytes_of(&frame.params));
@@ -215,97 +242,119 @@ impl GpuRenderer {
         moved |= self.edges.write(device, queue, bytemuck::cast_slice(&frame.edges));
         moved |= self.bodies.write(device, queue, bytemuck::cast_slice(&frame.bodies));
         moved |= self.lamps.write(device, queue, bytemuck::cast_slice(&frame.lamps));
-        moved |= self.picture.reserve(device, bytes);
-        self.readback.reserve(device, bytes);
-        if self.scene.as_ref().is_none_or(|s| s.0 != scene.id) {
-            let buffer = |label, contents| {
-                let usage = wgpu::BufferUsages::STORAGE;
-                device.create_buffer_init(&wgpu::util::BufferInitDescriptor { label: Some(label), contents, usage })
-            };
-            let materials = buffer("materials", bytemuck::cast_slice(&scene.materials));
-            let atlas = buffer("atlas", bytemuck::cast_slice(&scene.atlas));
-            self.scene = Some((scene.id, materials, atlas));
-            moved = true;
+        if self.scene != Some(scene.id) {
+            moved |= self.materials.write(device, queue, bytemuck::cast_slice(&scene.materials));
+            moved |= self.atlas.write(device, queue, bytemuck::cast_slice(&scene.atlas));
+            self.scene = Some(scene.id);
         }
         if moved {
-            self.bindings = None;
+            self.slots.iter_mut().for_each(|slot| slot.bindings = None);
         }
     }
 
-    fn bind(&mut self) -> Result<()> {
-        if self.bindings.is_some() {
-            return Ok(());
+    /// The bindings of a slot with room for `bytes`, and its two buffers.
+    fn bind(&mut self, slot: usize, bytes: u64) -> Result<(&wgpu::BindGroup, &wgpu::Buffer, &wgpu::Buffer)> {
+        let device = &self.shared.device;
+        let place = &mut self.slots[slot];
+        place.readback.reserve(device, bytes);
+        if place.picture.reserve(device, bytes) {
+            place.bindings = None;
         }
-        let (_, materials, atlas) = self.scene.as_ref().ok_or_else(missing)?;
-        let tables = [&self.params, &self.directions, &self.rows, &self.edges, &self.bodies, &self.lamps];
-        let mut buffers = Vec::with_capacity(9);
-        for table in tables {
-            buffers.push(table.buffer.as_ref().ok_or_else(missing)?);
+        let picture = place.picture.buffer.as_ref().ok_or_else(missing)?;
+        let readback = place.readback.buffer.as_ref().ok_or_else(missing)?;
+        if place.bindings.is_none() {
+            let geometry = [&self.params, &self.directions, &self.rows, &self.edges, &self.bodies];
+            let mut buffers = Vec::with_capacity(9);
+            for table in geometry.into_iter().chain([&self.lamps, &self.materials, &self.atlas]) {
+                buffers.push(table.buffer.as_ref().ok_or_else(missing)?);
+            }
+            buffers.push(picture);
+            let entries: Vec<_> = (0_u32..)
+                .zip(&buffers)
+                .map(|(binding, b)| wgpu::BindGroupEntry { binding, resource: b.as_entire_binding() })
+                .collect();
+            place.bindings = Some(device.create_bind_group(&wgpu::BindGroupDescriptor {
+                label: Some("panorama"),
+                layout: &self.shared.pipeline.get_bind_group_layout(0),
+                entries: &entries,
+            }));
         }
-        buffers.extend([materials, atlas, self.picture.buffer.as_ref().ok_or_else(missing)?]);
-        let entries: Vec<_> = (0_u32..)
-            .zip(&buffers)
-            .map(|(binding, b)| wgpu::BindGroupEntry { binding, resource: b.as_entire_binding() })
-            .collect();
-        self.bindings = Some(self.shared.device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some("panorama"),
-            layout: &self.shared.pipeline.get_bind_group_layout(0),
-            entries: &entries,
-        }));
-        Ok(())
+        Ok((place.bindings.as_ref().ok_or_else(missing)?, picture, readback))
     }
 
-    /// Starts a picture and its way back; the receiver hears when it has arrived.
-    fn dispatch(&self, bytes: u64) -> Result<(wgpu::SubmissionIndex, MapOutcome)> {
-        let (Some(picture), Some(readback)) = (&self.picture.buffer, &self.readback.buffer) else {
-            return Err(missing());
-        };
-        let p = &self.frame.params;
-        let mut encoder = self.shared.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+    /// Starts a picture and its way back.
+    fn start(&mut self, scene: &Scene, view: &View<'_>, slot: usize) -> Result<Under> {
+        self.shared.check()?;
+        self.check_size(scene, view)?;
+        self.frame.prepare(scene, view)?;
+        if !self.shared.software {
+            self.frame.params.rows_per_invocation = HARDWARE_ROWS.min(view.projection.height);
+        }
+        let bytes = view.projection.pixels() as u64 * PIXEL_BYTES;
+        self.upload(scene);
+        let p = self.frame.params;
+        let shared = Arc::clone(&self.shared);
+        let (bindings, picture, readback) = self.bind(slot, bytes)?;
+        shared.check()?;
+        let mut encoder = shared.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         {
             let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
-            pass.set_pipeline(&self.shared.pipeline);
-            pass.set_bind_group(0, &self.bindings, &[]);
+            pass.set_pipeline(&shared.pipeline);
+            pass.set_bind_group(0, bindings, &[]);
             pass.dispatch_workgroups(p.width.div_ceil(WORKGROUP), p.height.div_ceil(p.rows_per_invocation), 1);
         }
         encoder.copy_buffer_to_buffer(picture, 0, readback, 0, bytes);
-        let submission = self.shared.queue.submit([encoder.finish()]);
-        let (send, receive) = mpsc::channel();
+        let submission = shared.queue.submit([encoder.finish()]);
+        let (send, arrived) = mpsc::channel();
         readback.map_async(wgpu::MapMode::Read, 0..bytes, move |result| {
             // The receiver is gone only when waiting has failed already.
             let _ = send.send(result);
         });
-        Ok((submission, receive))
+        Ok(Under { submission, arrived, bytes })
     }
 
-    fn read(&self, view: &View<'_>, bytes: u64, out: &mut Panorama) -> Result<()> {
-        let (submission, arrived) = self.dispatch(bytes)?;
-        let wait = wgpu::PollType::Wait { submission_index: Some(submission), timeout: Some(TIMEOUT) };
+    /// Waits for a picture and copies it.
+    fn finish(&self, under: Under, slot: usize, view: &View<'_>, out: &mut Panorama) -> Result<()> {
+        let wait = wgpu::PollType::Wait { submission_index: Some(under.submission), timeout: Some(TIMEOUT) };
         let polled = self.shared.device.poll(wait);
         self.shared.check()?;
         polled.map_err(|e| gpu_error(&e))?;
         // Another renderer's thread may be the one to tell, a moment later.
-        arrived.recv_timeout(TIMEOUT).map_err(|e| gpu_error(&e))?.map_err(|e| gpu_error(&e))?;
-        let readback = self.readback.buffer.as_ref().ok_or_else(missing)?;
+        under.arrived.recv_timeout(TIMEOUT).map_err(|e| gpu_error(&e))?.map_err(|e| gpu_error(&e))?;
+        let readback = self.slots[slot].readback.buffer.as_ref().ok_or_else(missing)?;
         {
-            let mapped = readback.get_mapped_range(0..bytes).map_err(|e| gpu_error(&e))?;
+            let mapped = readback.get_mapped_range(0..under.bytes).map_err(|e| gpu_error(&e))?;
             let words: &[u32] = bytemuck::try_cast_slice(&mapped).map_err(|e| gpu_error(&e))?;
             let pixels = view.projection.pixels();
-            out.projection = view.projection;
-            out.rgba.clear();
-            out.rgba.extend_from_slice(bytemuck::cast_slice(&words[..pixels]));
-            out.range_m.clear();
-            out.range_m.extend_from_slice(bytemuck::cast_slice(&words[pixels..2 * pixels]));
-            out.instance.clear();
-            out.instance.extend(words[2 * pixels..3 * pixels].iter().map(|&id| id as u16));
+            out.reshape(view.projection)?;
+            out.rgba.copy_from_slice(bytemuck::cast_slice(&words[..pixels]));
+            out.range_m.copy_from_slice(bytemuck::cast_slice(&words[pixels..2 * pixels]));
+            for (instance, id) in out.instance.iter_mut().zip(&words[2 * pixels..3 * pixels]) {
+                *instance = *id as u16;
+            }
         }
         readback.unmap();
         Ok(())
     }
-}
 
-/// What mapping a buffer came to.
-type MapOutcome = mpsc::Receiver<std::result::Result<(), wgpu::BufferAsyncError>>;
+    /// Renders views with as many under way as there are slots.
+    fn render_in_flight(&mut self, scene: &Scene, views: &[View<'_>], out: &mut [Panorama]) -> Result<()> {
+        let mut under_way = VecDeque::with_capacity(IN_FLIGHT);
+        let mut waiting = views.iter().zip(out).enumerate();
+        for (k, view) in views.iter().enumerate() {
+            if under_way.len() == IN_FLIGHT
+                && let (Some(under), Some((first, (view, out)))) = (under_way.pop_front(), waiting.next())
+            {
+                self.finish(under, first % IN_FLIGHT, view, out)?;
+            }
+            under_way.push_back(self.start(scene, view, k % IN_FLIGHT)?);
+        }
+        for (under, (k, (view, out))) in under_way.into_iter().zip(waiting) {
+            self.finish(under, k % IN_FLIGHT, view, out)?;
+        }
+        Ok(())
+    }
+}
 
 fn gpu_error(e: &dyn std::fmt::Display) -> Error {
     Error::Gpu(e.to_string())
@@ -317,18 +366,18 @@ fn missing() -> Error {
 
 impl Renderer for GpuRenderer {
     fn render(&mut self, scene: &Scene, view: &View<'_>, out: &mut Panorama) -> Result<()> {
-        self.check_size(scene, view)?;
-        self.frame.prepare(scene, view)?;
-        if !self.shared.software {
-            self.frame.params.rows_per_invocation = HARDWARE_ROWS.min(view.projection.height);
-        }
-        let bytes = view.projection.pixels() as u64 * PIXEL_BYTES;
-        self.upload(scene, bytes);
-        self.bind()?;
-        self.shared.check()?;
-        self.read(view, bytes, out).inspect_err(|_| {
-            // Who knows what state it is in.
-            self.readback.buffer = None;
+        self.render_group(scene, std::slice::from_ref(view), std::slice::from_mut(out))
+    }
+
+    fn render_group(&mut self, scene: &Scene, views: &[View<'_>], out: &mut [Panorama]) -> Result<()> {
+        assert_eq!(views.len(), out.len(), "a place for each view");
+        self.render_in_flight(scene, views, out).inspect_err(|error| {
+            // Who knows what state buffers and device are in.
+            self.slots = (0..IN_FLIGHT).map(|_| Slot::new()).collect();
+            if let Error::Gpu(why) = error {
+                // A device that is gone may only say so later.
+                let _ = self.shared.lost.set(why.clone());
+            }
         })
     }
 
@@ -387,5 +436,41 @@ impl Table {
             queue.write_buffer(buffer, 0, bytes);
         }
         moved
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::world::World;
+
+    #[test]
+    fn a_device_lost_in_a_batch_is_an_error_and_the_next_renderer_works() {
+        let mut renderer = match GpuRenderer::new() {
+            Ok(renderer) => renderer,
+            Err(Error::NoAdapter(why)) => {
+                eprintln!("\n*** NOT RUN: there is no graphics adapter ({why}) ***\n");
+                assert!(std::env::var("WAYHOME_REQUIRE_GPU").as_deref() != Ok("1"), "WAYHOME_REQUIRE_GPU is 1");
+                return;
+            }
+            Err(error) => panic!("{error}"),
+        };
+        let world = World::open("lab").unwrap();
+        let scene = Scene::new(&world).unwrap();
+        let (projection, bodies) = (world.projection_of_size(320, 40), world.body_poses());
+        let views = vec![View { projection, robot: world.home, bodies: &bodies }; 400];
+        let device = renderer.shared.device.clone();
+        let mut shown = 0;
+        let error = renderer.render_batch(&scene, &views, &mut |_, panoramas| {
+            shown += panoramas.len();
+            device.destroy();
+            Ok(())
+        });
+        assert!(matches!(error, Err(Error::Gpu(_))), "{error:?}");
+        assert!(shown < views.len());
+        let mut out = Panorama::black(projection);
+        assert!(renderer.render(&scene, &views[0], &mut out).is_err(), "lost is lost");
+        GpuRenderer::new().unwrap().render(&scene, &views[0], &mut out).unwrap();
+        assert!(out.range_m.iter().all(|r| *r > 0.0));
     }
 }

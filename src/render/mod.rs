@@ -17,15 +17,19 @@
 //! - A camera's blur, noise and dirt change colours alone: range and instance ids stay exact.
 //! - The CPU renderer's pictures are the same bytes on every machine and any number of threads.
 
+mod batch;
 mod camera;
 mod columns;
 mod cpu;
 mod frame;
 mod gpu;
 mod hits;
+mod instructions;
 mod sample;
 mod scene;
 mod shade;
+mod spans;
+mod texels;
 mod texture;
 
 use crate::error::{Error, Result};
@@ -35,6 +39,7 @@ use crate::panorama::{Panorama, Projection};
 pub use camera::Camera;
 pub use cpu::CpuRenderer;
 pub use gpu::{GpuRenderer, SHADER};
+pub use instructions::InstructionSet;
 pub use scene::Scene;
 
 /// Which renderer a person asks for.
@@ -78,6 +83,54 @@ pub trait Renderer: Send {
     /// When a number of the view is not finite, the camera is inside a body ([`Error::CameraInside`]), the graphics device
     /// fails, or the size is more than it allows.
     fn render(&mut self, scene: &Scene, view: &View<'_>, out: &mut Panorama) -> Result<()>;
+
+    /// Renders several views at once, each into the place of `out` with its number: on the CPU a thread takes a picture, on a GPU
+    /// several pictures are under way. All of them are in memory together; [`Renderer::render_batch`] is for many.
+    ///
+    /// # Errors
+    /// As [`Renderer::render`]; then nothing is known of what `out` holds.
+    ///
+    /// # Panics
+    /// When `out` is not as long as `views`.
+    fn render_group(&mut self, scene: &Scene, views: &[View<'_>], out: &mut [Panorama]) -> Result<()>;
+
+    /// Renders many views and shows them to `sink` in their order, some at a time, with the number of the first of them. It may
+    /// do with them as it likes, for instance develop them by a camera.
+    ///
+    /// While `sink` works on one group of pictures the next one is rendered. At most two groups are in memory, whatever the length
+    /// of the batch: together two to 32 pictures for each thread of the pool, the fewer the larger they are. A GPU holds three
+    /// more, twice each. Each view has its own poses of
+    /// robot and bodies, so that a batch may be a film of moving bodies.
+    ///
+    /// ```
+    /// use wayhome::geometry::Pose;
+    /// use wayhome::render::{CpuRenderer, Renderer, Scene, View};
+    /// use wayhome::world::World;
+    ///
+    /// let world = World::open("lab")?;
+    /// let (projection, bodies) = (world.projection_of_size(90, 12), world.body_poses());
+    /// let turned = |k: u32| Pose { heading: 0.1 * f64::from(k), ..world.home };
+    /// let views: Vec<_> = (0..100).map(|k| View { projection, robot: turned(k), bodies: &bodies }).collect();
+    /// let mut seen = 0;
+    /// CpuRenderer::new().render_batch(&Scene::new(&world)?, &views, &mut |first, panoramas| {
+    ///     assert_eq!(first, seen, "in order");
+    ///     seen += panoramas.len();
+    ///     Ok(())
+    /// })?;
+    /// assert_eq!(seen, 100);
+    /// # Ok::<(), wayhome::Error>(())
+    /// ```
+    ///
+    /// # Errors
+    /// The first of `sink` or of a picture; those before it have been shown, but for the group in which it happened.
+    fn render_batch(
+        &mut self,
+        scene: &Scene,
+        views: &[View<'_>],
+        sink: &mut (dyn FnMut(usize, &mut [Panorama]) -> Result<()> + Send),
+    ) -> Result<()> {
+        batch::run(self, scene, views, sink)
+    }
 
     /// What this renderer is.
     fn info(&self) -> &RendererInfo;

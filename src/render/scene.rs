@@ -215,6 +215,9 @@ impl<'a> Surface<'a> {
     }
 }
 
+/// Texels after the last texture, for vectors that read beyond a line that they need a part of.
+const PADDING: usize = 16;
+
 /// Bakes every texture once, also where several surfaces share it.
 fn pack(surfaces: &[Surface<'_>]) -> (Vec<Material>, Vec<u32>) {
     let mut distinct: Vec<Surface<'_>> = Vec::new();
@@ -229,7 +232,7 @@ fn pack(surfaces: &[Surface<'_>]) -> (Vec<Material>, Vec<u32>) {
         .collect();
     let sizes = texture::log2_sizes(distinct.iter().map(|s| s.texture));
     let baked: Vec<texture::Baked> = distinct.par_iter().zip(sizes).map(|(s, n)| texture::bake(s, n)).collect();
-    let mut atlas = Vec::with_capacity(baked.iter().map(|b| b.texels.len()).sum());
+    let mut atlas = Vec::with_capacity(baked.iter().map(|b| b.texels.len()).sum::<usize>() + PADDING);
     let packed: Vec<Material> = baked
         .iter()
         .zip(&distinct)
@@ -242,5 +245,6 @@ fn pack(surfaces: &[Surface<'_>]) -> (Vec<Material>, Vec<u32>) {
             Material { base, log2_size: b.log2_size, texels_per_m }
         })
         .collect();
+    atlas.resize(atlas.len() + PADDING, 0);
     (which.into_iter().map(|k| packed[k]).collect(), atlas)
 }

@@ -4,12 +4,13 @@
 //! themselves, piece by piece. Ambient light reaches corners less where a world asks for that. There are no shadows and no
 //! reflections.
 
-use std::ops::Range;
-
 use super::Scene;
 use super::columns::Hit;
 use super::frame::{Edge, Frame, Lamp, Row};
-use super::sample::{RUN, Strip, coordinate, footprint, level, round, sample_points, strip_footprint, within_tile};
+use super::sample::{
+    LANES, POINTS, PointRoom, Points, RUN, Strip, StripRoom, coordinate, footprint, is_wanted, level, round, shade_point,
+    strip_footprint, within_tile,
+};
 use super::scene::Material;
 
 /// Least distance from a lamp that counts, squared, m^2: a lamp is no point.
@@ -62,95 +63,121 @@ fn depth_at_wall(frame: &Frame, edge: &Edge, [x, y]: [f32; 2], normal: [f32; 2])
     if before > -BEHIND { depth } else { 0.0 }
 }
 
-/// Colour times light, opaque. Light is rounded to 1/4096, at most 16, and the product is one of integers.
-#[inline(always)]
-fn light_up(colour: u32, light: f32) -> u32 {
-    let scaled = light * 4096.0;
-    let factor = round(if scaled < 65535.0 { scaled } else { 65535.0 }) as u32;
-    let channel = |c: u32| ((((c & 255) * 16 + 8) * factor) >> 16).min(255);
-    channel(colour) | channel(colour >> 8) << 8 | channel(colour >> 16) << 16 | 0xff00_0000
+/// Where the sides of a column are shaded.
+#[derive(Debug)]
+pub(super) struct SideRoom {
+    strip: StripRoom,
+    light: [f32; RUN],
 }
 
-/// Colours of the rows from `first_row` to `first_row + count` of a column that sees the side of `hit`; the colours up to the
-/// next multiple of eight are void.
-#[inline(always)]
-pub(super) fn shade_side(
-    scene: &Scene,
-    frame: &Frame,
-    hit: &Hit,
+impl Default for SideRoom {
+    fn default() -> Self {
+        Self { strip: StripRoom::default(), light: [0.0; RUN] }
+    }
+}
+
+/// The side of a wall or body as some rows of a column see it, with what they have in common.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Side<'a> {
+    hit: &'a Hit,
     direction: [f32; 2],
     first_row: usize,
     count: usize,
-    out: &mut [u32; RUN],
-) {
-    let material = &scene.materials[hit.surface as usize];
-    let eye = frame.params.camera_height;
-    // What the rows have in common: u, the step of v, the level of detail, and where the lamps stand.
-    let cosine = -(hit.normal[0] * direction[0] + hit.normal[1] * direction[1]);
-    let across = hit.near * frame.params.pixel_rad;
-    let slant = across / cosine.max(LEAST_COSINE);
-    let foot = hit.bottom.max(0.0);
-    let whole = count.next_multiple_of(8);
-    let out = &mut out[..whole];
-    let rows = &frame.rows[first_row..first_row + count];
-    if frame.params.equal_angle == 0 {
+    /// Its texture where the rows are even in the tangent of elevation; then all have one level of detail.
+    strip: Strip<'a>,
+    /// Length on it that a pixel covers sideways, m.
+    slant: f32,
+}
+
+impl<'a> Side<'a> {
+    /// The rows from `first_row` to `first_row + count` of a column that looks along `direction`; at most [`RUN`].
+    #[inline(always)]
+    pub fn new(scene: &'a Scene, frame: &'a Frame, hit: &'a Hit, direction: [f32; 2], first_row: usize, count: usize) -> Self {
+        let material = &scene.materials[hit.surface as usize];
+        let cosine = -(hit.normal[0] * direction[0] + hit.normal[1] * direction[1]);
+        let across = hit.near * frame.params.pixel_rad;
+        let slant = across / cosine.max(LEAST_COSINE);
         let level = level(material, strip_footprint(material, [slant, across]));
-        let v = eye + hit.near * frame.rows[0].tan - foot;
-        Strip::new(material, hit.u, v, across, level).sample(&scene.atlas, first_row, out);
-    } else {
+        let v = frame.params.camera_height + hit.near * frame.rows[0].tan - hit.bottom.max(0.0);
+        let strip = Strip::new(&scene.atlas, material, [hit.u, v, across], level, first_row);
+        Self { hit, direction, first_row, count, strip, slant }
+    }
+
+    /// Asks for the texels.
+    #[inline(always)]
+    pub fn fetch(&self) {
+        self.strip.fetch(self.count);
+    }
+
+    /// Colours of the rows. What follows in `out` up to a whole number of blocks is overwritten, too.
+    #[inline(always)]
+    pub fn shade(&self, frame: &Frame, room: &mut SideRoom, out: &mut [u32]) {
+        self.light(frame, &mut room.light[..self.count]);
+        if frame.params.equal_angle == 0 {
+            let blocks = self.count.div_ceil(LANES);
+            let (light, out) = (room.light.as_chunks().0, out.as_chunks_mut().0);
+            self.strip.shade(&light[..blocks], &mut room.strip, &mut out[..blocks]);
+            return;
+        }
         // Steps and level of detail change from row to row.
-        let u = coordinate(hit.u, material, 0);
-        for (colour, row) in out.iter_mut().zip(rows) {
-            let high = across * row.stretch * row.stretch;
-            let level = level(material, footprint(material, [slant, high]));
-            let v = coordinate(eye + hit.near * row.tan - foot, material, 1);
-            [*colour] = sample_points(&scene.atlas, material, [&[u], &[v]], level, 0..1);
+        let Strip { atlas, material, u, .. } = self.strip;
+        let (near, foot) = (self.hit.near, self.hit.bottom.max(0.0));
+        let rows = &frame.rows[self.first_row..self.first_row + self.count];
+        for ((colour, row), light) in out.iter_mut().zip(rows).zip(&room.light) {
+            let high = near * frame.params.pixel_rad * row.stretch * row.stretch;
+            let level = level(material, footprint(material, [self.slant, high]));
+            let v = coordinate(frame.params.camera_height + near * row.tan - foot, material, 1);
+            *colour = shade_point(atlas, material, [u, v], level, *light);
         }
     }
-    let mut light = [frame.params.ambient; RUN];
-    let light = &mut light[..whole];
-    let at = hit.near;
-    let point = [at * direction[0], at * direction[1]];
-    if frame.params.corner_shade > 0.0 {
-        let walls = &frame.edges[..frame.params.wall_count as usize];
-        let nook = walls.iter().fold(0.0, |deepest: f32, e| deepest.max(depth_at_wall(frame, e, point, hit.normal)));
-        let reaches = |depth: f32| 1.0 - frame.params.corner_shade * depth;
-        for (light, row) in light.iter_mut().zip(rows) {
-            let z = eye + at * row.tan;
-            let edge = depth(frame, z).max(depth(frame, frame.params.room_height - z));
-            *light *= reaches(nook) * reaches(edge);
-        }
-    }
-    let glow = glow(frame, hit.surface);
-    if glow > 0.0 {
-        for light in light.iter_mut() {
-            *light += glow;
-        }
-    }
-    let (lamps, panes) = frame.lamps.split_at(frame.params.lamp_count as usize);
-    for lamp in lamps {
-        let to = [lamp.position[0] - point[0], lamp.position[1] - point[1]];
-        let facing = hit.normal[0] * to[0] + hit.normal[1] * to[1];
-        if facing > 0.0 {
-            let offset_squared = to[0] * to[0] + to[1] * to[1];
+
+    /// Light on the rows.
+    #[inline(always)]
+    fn light(&self, frame: &Frame, light: &mut [f32]) {
+        let Self { hit, direction, first_row, count, .. } = *self;
+        let eye = frame.params.camera_height;
+        let rows = &frame.rows[first_row..first_row + count];
+        light.fill(frame.params.ambient);
+        let at = hit.near;
+        let point = [at * direction[0], at * direction[1]];
+        if frame.params.corner_shade > 0.0 {
+            let walls = &frame.edges[..frame.params.wall_count as usize];
+            let nook = walls.iter().fold(0.0, |deepest: f32, e| deepest.max(depth_at_wall(frame, e, point, hit.normal)));
+            let reaches = |depth: f32| 1.0 - frame.params.corner_shade * depth;
             for (light, row) in light.iter_mut().zip(rows) {
-                *light += lit(lamp, offset_squared, eye + at * row.tan, facing);
+                let z = eye + at * row.tan;
+                let edge = depth(frame, z).max(depth(frame, frame.params.room_height - z));
+                *light *= reaches(nook) * reaches(edge);
             }
         }
-    }
-    for pane in panes {
-        let to = [pane.position[0] - point[0], pane.position[1] - point[1]];
-        let facing = hit.normal[0] * to[0] + hit.normal[1] * to[1];
-        let faced = -(pane.normal[0] * to[0] + pane.normal[1] * to[1]);
-        if facing > 0.0 && faced > 0.0 {
-            let (weight, offset_squared) = (pane.intensity * facing * faced, to[0] * to[0] + to[1] * to[1]);
-            for (light, row) in light.iter_mut().zip(rows) {
-                *light += lit_by_window(pane, weight, offset_squared, eye + at * row.tan);
+        let glow = glow(frame, hit.surface);
+        if glow > 0.0 {
+            for light in light.iter_mut() {
+                *light += glow;
             }
         }
-    }
-    for (colour, light) in out.iter_mut().zip(light) {
-        *colour = light_up(*colour, *light);
+        let (lamps, panes) = frame.lamps.split_at(frame.params.lamp_count as usize);
+        for lamp in lamps {
+            let to = [lamp.position[0] - point[0], lamp.position[1] - point[1]];
+            let facing = hit.normal[0] * to[0] + hit.normal[1] * to[1];
+            if facing > 0.0 {
+                let offset_squared = to[0] * to[0] + to[1] * to[1];
+                for (light, row) in light.iter_mut().zip(rows) {
+                    *light += lit(lamp, offset_squared, eye + at * row.tan, facing);
+                }
+            }
+        }
+        for pane in panes {
+            let to = [pane.position[0] - point[0], pane.position[1] - point[1]];
+            let facing = hit.normal[0] * to[0] + hit.normal[1] * to[1];
+            let faced = -(pane.normal[0] * to[0] + pane.normal[1] * to[1]);
+            if facing > 0.0 && faced > 0.0 {
+                let (weight, offset_squared) = (pane.intensity * facing * faced, to[0] * to[0] + to[1] * to[1]);
+                for (light, row) in light.iter_mut().zip(rows) {
+                    *light += lit_by_window(pane, weight, offset_squared, eye + at * row.tan);
+                }
+            }
+        }
     }
 }
 
@@ -158,6 +185,16 @@ pub(super) fn shade_side(
 #[inline(always)]
 fn glow(frame: &Frame, surface: u32) -> f32 {
     surface.checked_sub(2 + frame.params.wall_count).map_or(0.0, |k| frame.bodies[k as usize].glow)
+}
+
+/// A row of the picture that sees a horizontal surface.
+#[derive(Clone, Copy)]
+pub(super) struct Sight<'a> {
+    pub scene: &'a Scene,
+    pub frame: &'a Frame,
+    pub row: &'a Row,
+    /// Horizontal distance at which it is met, m.
+    pub t: f32,
 }
 
 /// A horizontal surface: floor, ceiling, or the top or underside of a body.
@@ -195,17 +232,21 @@ impl Plane {
         Self { material, heading, camera, z, up: if underside { -1.0 } else { 1.0 }, glow: glow(frame, surface) }
     }
 
-    /// Colours of the columns `wanted` of a row that sees it, at horizontal distance `t`; the other colours mean nothing.
+    /// Height of the surface, m.
+    pub fn height(&self) -> f32 {
+        self.z
+    }
+
+    /// Colours of some columns of a row that sees it, those that have a bit in `wanted`; they look along `x` and `y`.
     #[inline(always)]
-    pub fn shade<const N: usize>(
+    pub fn shade(
         &self,
-        scene: &Scene,
-        frame: &Frame,
-        [x, y]: &[[f32; N]; 2],
-        t: f32,
-        row: &Row,
-        wanted: Range<usize>,
-    ) -> [u32; N] {
+        Sight { scene, frame, row, t }: Sight<'_>,
+        [x, y]: [&[f32; POINTS]; 2],
+        wanted: u64,
+        room: &mut PointRoom,
+        out: &mut [u32; POINTS],
+    ) {
         let [cos, sin] = self.heading;
         let across = t * frame.params.pixel_rad;
         // Rows that are even in elevation are farther apart in its tangent.
@@ -214,19 +255,40 @@ impl Plane {
         let finest = self.material.texels_per_m[0].max(self.material.texels_per_m[1]);
         let level = level(&self.material, (0.5 * deep.max(across)).max(deep.min(across)) * finest);
         let texels = self.material.texels_per_m.map(|scale| t * scale);
-        let fixed = |texels: f32, along: f32, camera: f32| round((texels * along + camera) * 256.0) << 8;
-        let (mut u, mut v) = ([0; N], [0; N]);
-        for k in 0..N {
-            u[k] = fixed(texels[0], cos * x[k] + sin * y[k], self.camera[0]);
-            v[k] = fixed(texels[1], cos * y[k] - sin * x[k], self.camera[1]);
+        let (mut u, mut v) = ([0; POINTS], [0; POINTS]);
+        for k in 0..POINTS {
+            u[k] = round((texels[0] * (cos * x[k] + sin * y[k]) + self.camera[0]) * 256.0) << 8;
+            v[k] = round((texels[1] * (cos * y[k] - sin * x[k]) + self.camera[1]) * 256.0) << 8;
         }
-        let mut colours = sample_points(&scene.atlas, &self.material, [&u, &v], level, wanted);
-        let mut light = [frame.params.ambient; N];
+        let points = Points { atlas: &scene.atlas, material: &self.material, u: &u, v: &v, level };
+        points.look_up(wanted, room);
+        let (x, y, out) = (x.as_chunks().0, y.as_chunks().0, out.as_chunks_mut::<LANES>().0);
+        for (block, ((x, y), out)) in x.iter().zip(y).zip(out).enumerate() {
+            if !is_wanted(wanted, block) {
+                continue;
+            }
+            let mut lit = [0; LANES];
+            points.shade(block, &self.light(frame, x, y, t), room, &mut lit);
+            let wanted = (wanted >> (LANES * block)) as u16;
+            if wanted == u16::MAX {
+                *out = lit;
+            } else {
+                for k in 0..LANES {
+                    out[k] = if wanted >> k & 1 != 0 { lit[k] } else { out[k] };
+                }
+            }
+        }
+    }
+
+    /// Light on it in some directions at horizontal distance `t`.
+    #[inline(always)]
+    fn light(&self, frame: &Frame, x: &[f32; LANES], y: &[f32; LANES], t: f32) -> [f32; LANES] {
+        let mut light = [frame.params.ambient; LANES];
         if frame.params.corner_shade > 0.0 {
-            let mut nook = [0.0_f32; N];
+            let mut nook = [0.0_f32; LANES];
             for edge in &frame.edges[..frame.params.wall_count as usize] {
-                for (k, nook) in nook.iter_mut().enumerate() {
-                    *nook = nook.max(depth_at_wall(frame, edge, [t * x[k], t * y[k]], [0.0; 2]));
+                for k in 0..LANES {
+                    nook[k] = nook[k].max(depth_at_wall(frame, edge, [t * x[k], t * y[k]], [0.0; 2]));
                 }
             }
             for (light, nook) in light.iter_mut().zip(nook) {
@@ -234,32 +296,31 @@ impl Plane {
             }
         }
         if self.glow > 0.0 {
-            light = light.map(|light| light + self.glow);
+            for light in &mut light {
+                *light += self.glow;
+            }
         }
         let (lamps, panes) = frame.lamps.split_at(frame.params.lamp_count as usize);
         for lamp in lamps {
             let facing = self.up * (lamp.height - self.z);
             if facing > 0.0 {
-                for (k, light) in light.iter_mut().enumerate() {
+                for k in 0..LANES {
                     let to = [lamp.position[0] - t * x[k], lamp.position[1] - t * y[k]];
-                    *light += lit(lamp, to[0] * to[0] + to[1] * to[1], self.z, facing);
+                    light[k] += lit(lamp, to[0] * to[0] + to[1] * to[1], self.z, facing);
                 }
             }
         }
         for pane in panes {
             let facing = self.up * (pane.height - self.z);
             if facing > 0.0 {
-                for (k, light) in light.iter_mut().enumerate() {
+                for k in 0..LANES {
                     let to = [pane.position[0] - t * x[k], pane.position[1] - t * y[k]];
                     let faced = -(pane.normal[0] * to[0] + pane.normal[1] * to[1]);
                     let weight = pane.intensity * facing * if faced > 0.0 { faced } else { 0.0 };
-                    *light += lit_by_window(pane, weight, to[0] * to[0] + to[1] * to[1], self.z);
+                    light[k] += lit_by_window(pane, weight, to[0] * to[0] + to[1] * to[1], self.z);
                 }
             }
         }
-        for (colour, light) in colours.iter_mut().zip(light) {
-            *colour = light_up(*colour, light);
-        }
-        colours
+        light
     }
 }

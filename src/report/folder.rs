@@ -20,21 +20,18 @@ const PARTIAL: &str = ".wayhome-partial";
 pub struct OutputFolder {
     path: PathBuf,
     names: &'static [&'static str],
-    written: BTreeSet<&'static str>,
+    written: BTreeSet<String>,
 }
 
 impl OutputFolder {
-    /// Opens or creates the folder for `verb`, which writes files of the given names.
+    /// Opens or creates the folder for `verb`, which writes files of the given names. A `#` in a name stands for any number:
+    /// `frame-#.png`.
     ///
     /// # Errors
     /// When the folder cannot be created or read, or holds what `verb` has not written.
     pub fn open(path: &Path, verb: &str, names: &'static [&'static str]) -> Result<Self> {
         fs::create_dir_all(path).map_err(io_error("create folder", path))?;
-        let mut held = Vec::new();
-        for entry in fs::read_dir(path).map_err(io_error("read folder", path))? {
-            held.push(entry.map_err(io_error("read folder", path))?.file_name().to_string_lossy().into_owned());
-        }
-        held.sort();
+        let held = files(path)?;
         let marker = path.join(MARKER);
         let refused = |found: String| Error::OutputTaken { path: path.to_owned(), found };
         if !held.is_empty() {
@@ -45,7 +42,7 @@ impl OutputFolder {
                 Err(source) => return Err(Error::Io { action: "read", path: marker, source }),
             }
         }
-        if let Some(foreign) = held.iter().find(|h| *h != MARKER && !h.ends_with(PARTIAL) && !names.contains(&h.as_str())) {
+        if let Some(foreign) = held.iter().find(|h| *h != MARKER && !h.ends_with(PARTIAL) && !is_announced(names, h)) {
             return Err(refused(format!("`{foreign}`")));
         }
         for partial in held.iter().filter(|h| h.ends_with(PARTIAL)) {
@@ -68,10 +65,10 @@ impl OutputFolder {
     ///
     /// # Panics
     /// When `name` is none of the names that the folder was opened with, which is a fault in this program.
-    pub fn write(&mut self, name: &'static str, bytes: &[u8]) -> Result<()> {
-        assert!(self.names.contains(&name), "`{name}` is not announced");
+    pub fn write(&mut self, name: &str, bytes: &[u8]) -> Result<()> {
+        assert!(is_announced(self.names, name), "`{name}` is not announced");
         write_atomically(&self.path.join(name), bytes)?;
-        self.written.insert(name);
+        self.written.insert(name.to_owned());
         Ok(())
     }
 
@@ -97,7 +94,7 @@ impl OutputFolder {
     /// When what is left of it cannot be written.
     pub fn complete(&mut self, mut file: GrowingFile) -> Result<()> {
         file.writer.flush().and_then(|()| fs::rename(&file.partial, &file.path)).map_err(io_error("write", &file.path))?;
-        self.written.insert(file.name);
+        self.written.insert(file.name.to_owned());
         Ok(())
     }
 
@@ -106,8 +103,30 @@ impl OutputFolder {
     /// # Errors
     /// When a file cannot be removed.
     pub fn finish(self) -> Result<()> {
-        self.names.iter().filter(|n| !self.written.contains(*n)).try_for_each(|name| remove(&self.path.join(name)))
+        let stale = |name: &String| is_announced(self.names, name) && !self.written.contains(name);
+        files(&self.path)?.iter().filter(|name| stale(name)).try_for_each(|name| remove(&self.path.join(name)))
     }
+}
+
+/// Names of what is in a folder, sorted.
+fn files(path: &Path) -> Result<Vec<String>> {
+    let mut names = Vec::new();
+    for entry in fs::read_dir(path).map_err(io_error("read folder", path))? {
+        names.push(entry.map_err(io_error("read folder", path))?.file_name().to_string_lossy().into_owned());
+    }
+    names.sort();
+    Ok(names)
+}
+
+/// Whether a file's name is one of `names`.
+fn is_announced(names: &[&str], file: &str) -> bool {
+    names.iter().any(|name| match name.split_once('#') {
+        None => *name == file,
+        Some((before, after)) => {
+            let number = file.strip_prefix(before).and_then(|rest| rest.strip_suffix(after));
+            number.is_some_and(|n| !n.is_empty() && n.bytes().all(|b| b.is_ascii_digit()))
+        }
+    })
 }
 
 /// A file that is being written piece by piece, so that nobody has to hold all of it; see [`OutputFolder::begin`].
@@ -217,6 +236,18 @@ mod tests {
         let error = OutputFolder::open(base.path(), "home", NAMES).unwrap_err().to_string();
         assert!(error.contains("`a.txt`"), "{error}");
         assert_eq!(fs::read(base.path().join("a.txt")).unwrap(), b"mine");
+
+        let numbered = base.path().join("numbered");
+        let mut first = OutputFolder::open(&numbered, "home", &["frame-#.png"]).unwrap();
+        first.write("frame-000001.png", b"1").unwrap();
+        first.write("frame-000002.png", b"2").unwrap();
+        first.finish().unwrap();
+        let mut second = OutputFolder::open(&numbered, "home", &["frame-#.png"]).unwrap();
+        second.write("frame-000001.png", b"1").unwrap();
+        second.finish().unwrap();
+        assert!(!numbered.join("frame-000002.png").exists());
+        fs::write(numbered.join("frame-x.png"), "mine").unwrap();
+        assert!(OutputFolder::open(&numbered, "home", &["frame-#.png"]).is_err());
 
         let ours = base.path().join("ours");
         OutputFolder::open(&ours, "home", NAMES).unwrap().finish().unwrap();

@@ -1,9 +1,9 @@
 //! Panoramas as PNG files.
 
-use std::io::Cursor;
 use std::path::Path;
 
-use image::{DynamicImage, ImageBuffer, ImageFormat, Luma, Rgb};
+use image::codecs::png::{CompressionType, FilterType, PngEncoder};
+use image::{DynamicImage, ImageBuffer, Luma, Rgb};
 
 use crate::error::{Error, Result};
 use crate::panorama::Panorama;
@@ -14,7 +14,7 @@ use crate::panorama::Panorama;
 /// When the panorama cannot be encoded; `name` is what the error calls it.
 pub fn colours_png(panorama: &Panorama, name: &str) -> Result<Vec<u8>> {
     let rgb = panorama.rgba.chunks_exact(4).flat_map(|p| [p[0], p[1], p[2]]).collect();
-    encode(buffer::<Rgb<u8>>(panorama, rgb).map(DynamicImage::ImageRgb8), name)
+    encode_filled(buffer::<Rgb<u8>>(panorama, rgb).map(DynamicImage::ImageRgb8), name)
 }
 
 /// The range in millimetres, rounded, 16 bits; 65535 stands for all that is farther.
@@ -24,7 +24,7 @@ pub fn colours_png(panorama: &Panorama, name: &str) -> Result<Vec<u8>> {
 pub fn range_png(panorama: &Panorama, name: &str) -> Result<Vec<u8>> {
     // The cast saturates: below zero at 0, above at 65535.
     let millimetres = panorama.range_m.iter().map(|r| (f64::from(*r) * 1000.0).round() as u16).collect();
-    encode(buffer::<Luma<u16>>(panorama, millimetres).map(DynamicImage::ImageLuma16), name)
+    encode_filled(buffer::<Luma<u16>>(panorama, millimetres).map(DynamicImage::ImageLuma16), name)
 }
 
 /// The instance ids, 16 bits.
@@ -32,7 +32,7 @@ pub fn range_png(panorama: &Panorama, name: &str) -> Result<Vec<u8>> {
 /// # Errors
 /// When the panorama has no instances or cannot be encoded; `name` is what the error calls it.
 pub fn instance_png(panorama: &Panorama, name: &str) -> Result<Vec<u8>> {
-    encode(buffer::<Luma<u16>>(panorama, panorama.instance.clone()).map(DynamicImage::ImageLuma16), name)
+    encode_filled(buffer::<Luma<u16>>(panorama, panorama.instance.clone()).map(DynamicImage::ImageLuma16), name)
 }
 
 type Buffer<P> = ImageBuffer<P, Vec<<P as image::Pixel>::Subpixel>>;
@@ -45,15 +45,24 @@ fn buffer<P: image::Pixel>(panorama: &Panorama, data: Vec<P::Subpixel>) -> Optio
         .flatten()
 }
 
-fn encode(image: Option<DynamicImage>, name: &str) -> Result<Vec<u8>> {
+fn encode_filled(image: Option<DynamicImage>, name: &str) -> Result<Vec<u8>> {
     let image = image.ok_or_else(|| Error::Invalid {
         what: format!("panorama for {name}"),
         found: "a channel of another size than the panorama".into(),
         allowed: "a value for every pixel".into(),
     })?;
-    let mut bytes = Cursor::new(Vec::new());
-    image.write_to(&mut bytes, ImageFormat::Png).map_err(|source| Error::Image { path: Path::new(name).to_owned(), source })?;
-    Ok(bytes.into_inner())
+    encode(&image, name)
+}
+
+/// An image as a PNG file, by the fast compression: the better one takes twenty times as long for a tenth less.
+///
+/// # Errors
+/// When it cannot be encoded; `name` is what the error calls it.
+pub(super) fn encode(image: &DynamicImage, name: &str) -> Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    let encoder = PngEncoder::new_with_quality(&mut bytes, CompressionType::Fast, FilterType::Adaptive);
+    image.write_with_encoder(encoder).map_err(|source| Error::Image { path: Path::new(name).to_owned(), source })?;
+    Ok(bytes)
 }
 
 #[cfg(test)]

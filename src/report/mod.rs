@@ -13,9 +13,11 @@ pub mod map;
 pub mod paper;
 mod path_plot;
 pub mod physics;
+pub mod render;
 pub mod robustness;
 pub mod run;
 pub mod seeds;
+pub mod sheet;
 pub mod text;
 pub mod vision;
 

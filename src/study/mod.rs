@@ -2,9 +2,11 @@
 
 pub mod bound;
 pub mod compare;
+pub mod film;
 pub mod observability;
 pub mod paper;
 pub mod physics;
+pub mod render;
 pub mod robustness;
 pub mod seeds;
 pub mod statistics;

@@ -1,46 +1,107 @@
-//! Panoramas a second: `cargo bench --bench render`. Throughput is in pictures, "elem/s".
+//! Panoramas a second: `cargo bench --bench render`. Throughput is in pictures, "elem/s". `wayhome render --bench` prints the
+//! same for people, with the share of what memory allows.
 //!
-//! - `cpu, one thread`: what each worker of a study gets.
-//! - `cpu, all threads`: one picture shared out over the cores.
-//! - `gpu`: the best adapter, upload and readback included; not there without an adapter.
-//! - `scene`: packing a world, which is mostly baking its textures.
+//! - `limit`: 256 MiB filled by one thread; throughput is in bytes.
+//! - size by size, in a hall of 40 textured walls and 20 discs:
+//!   - `cpu, one thread`, for each instruction set: what each worker of a study gets.
+//!   - `cpu, all threads`: one picture shared out over the cores.
+//!   - `batch of 16, all threads`: pictures side by side.
+//!   - `gpu, alone` and `gpu, batch of 16`: the best adapter, upload and readback included; not there without an adapter.
+//! - `bodies`: what 10 to 1,000 of them cost.
+//! - `scene`: packing the lab, which is mostly baking its textures.
 
 #![allow(clippy::unwrap_used, missing_docs)]
 
-use std::path::Path;
+use std::hint::black_box;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use wayhome::geometry::Pose;
-use wayhome::panorama::Panorama;
-use wayhome::render::{CpuRenderer, GpuRenderer, Renderer, Scene, View};
+use wayhome::panorama::{Panorama, Projection};
+use wayhome::render::{CpuRenderer, GpuRenderer, InstructionSet, Renderer, Scene, View};
+use wayhome::study::render::{BODIES, SIZES, hall};
 use wayhome::world::World;
 
-fn benches(c: &mut Criterion) {
-    let world = World::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("worlds/lab.toml")).unwrap();
-    let scene = Scene::new(&world).unwrap();
-    let bodies = world.body_poses();
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
-    let mut gpu = GpuRenderer::new();
-    for (width, height) in [(561, 81), (1440, 180), (4680, 480)] {
-        let mut group = c.benchmark_group(format!("{width} x {height}"));
-        group.throughput(Throughput::Elements(1));
-        let projection = world.projection_of_size(width, height);
-        let mut out = Panorama::black(projection);
-        let mut turn = 0.0;
-        let mut picture = |renderer: &mut dyn Renderer| {
-            turn += 0.01;
-            let robot = Pose::new(world.home.x, world.home.y, turn);
-            renderer.render(&scene, &View { projection, robot, bodies: &bodies }, &mut out).unwrap();
+/// Pictures of a batch.
+const BATCH: usize = 16;
+
+/// A hall, and the views that are taken of it.
+struct Hall {
+    world: World,
+    scene: Scene,
+    bodies: Vec<Pose>,
+}
+
+impl Hall {
+    fn new(discs: usize) -> Self {
+        let world = hall(discs).unwrap();
+        Self { scene: Scene::new(&world).unwrap(), bodies: world.body_poses(), world }
+    }
+
+    fn view(&self, projection: Projection, k: usize) -> View<'_> {
+        View { projection, robot: Pose::new(0.1, -0.2, 0.01 * k as f64), bodies: &self.bodies }
+    }
+
+    fn picture(&self, renderer: &mut dyn Renderer, projection: Projection, k: &mut usize, out: &mut Panorama) {
+        *k += 1;
+        renderer.render(&self.scene, &self.view(projection, *k), out).unwrap();
+    }
+
+    fn batch(&self, renderer: &mut dyn Renderer, projection: Projection) {
+        let views: Vec<_> = (0..BATCH).map(|k| self.view(projection, k)).collect();
+        let mut look = |_: usize, panoramas: &mut [Panorama]| {
+            black_box(panoramas);
+            Ok(())
         };
+        renderer.render_batch(&self.scene, &views, &mut look).unwrap();
+    }
+}
+
+fn benches(c: &mut Criterion) {
+    let mut memory = vec![1_u8; 256 << 20];
+    let mut group = c.benchmark_group("limit");
+    group.throughput(Throughput::Bytes(memory.len() as u64)).sample_size(20);
+    group.bench_function("fill", |b| b.iter(|| black_box(&mut memory).fill(black_box(0))));
+    group.finish();
+
+    let hall = Hall::new(20);
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+    let mut gpu = GpuRenderer::new().ok();
+    let (mut out, mut k) = (Panorama::empty(), 0);
+    for (width, height) in SIZES {
+        let mut group = c.benchmark_group(format!("{width} x {height}"));
+        group.throughput(Throughput::Elements(1)).sample_size(40);
+        let projection = hall.world.projection_of_size(width, height);
+        for set in InstructionSet::ALL.into_iter().filter(|set| set.is_available()) {
+            let mut cpu = CpuRenderer::on(set).unwrap();
+            group.bench_function(format!("cpu, one thread, {set}"), |b| {
+                pool.install(|| b.iter(|| hall.picture(&mut cpu, projection, &mut k, &mut out)));
+            });
+        }
         let mut cpu = CpuRenderer::new();
-        group.bench_function("cpu, one thread", |b| pool.install(|| b.iter(|| picture(&mut cpu))));
-        group.bench_function("cpu, all threads", |b| b.iter(|| picture(&mut cpu)));
-        if let Ok(gpu) = &mut gpu {
-            group.bench_function("gpu", |b| b.iter(|| picture(gpu)));
+        group.bench_function("cpu, all threads", |b| b.iter(|| hall.picture(&mut cpu, projection, &mut k, &mut out)));
+        if let Some(gpu) = &mut gpu {
+            group.bench_function("gpu, alone", |b| b.iter(|| hall.picture(gpu, projection, &mut k, &mut out)));
+        }
+        group.throughput(Throughput::Elements(BATCH as u64)).sample_size(10);
+        group.bench_function("cpu, batch of 16, all threads", |b| b.iter(|| hall.batch(&mut cpu, projection)));
+        if let Some(gpu) = &mut gpu {
+            group.bench_function("gpu, batch of 16", |b| b.iter(|| hall.batch(gpu, projection)));
         }
         group.finish();
     }
-    c.bench_function("scene", |b| b.iter(|| Scene::new(&world).unwrap()));
+    let mut group = c.benchmark_group("bodies");
+    group.throughput(Throughput::Elements(1));
+    for bodies in BODIES {
+        let hall = Hall::new(bodies);
+        let projection = hall.world.projection_of_size(1440, 180);
+        let mut cpu = CpuRenderer::new();
+        group.bench_function(format!("{bodies}"), |b| {
+            pool.install(|| b.iter(|| hall.picture(&mut cpu, projection, &mut k, &mut out)));
+        });
+    }
+    group.finish();
+    let lab = World::open("lab").unwrap();
+    c.bench_function("scene", |b| b.iter(|| Scene::new(&lab).unwrap()));
 }
 
 criterion_group!(render, benches);

@@ -1,0 +1,27 @@
+//! `wayhome render --bench`: how fast this machine renders.
+
+use anyhow::Result;
+use wayhome::Error;
+use wayhome::report::render as render_report;
+use wayhome::study::render::{Effort, Findings, measure};
+
+use crate::cli::Verdict;
+use crate::cli::context::Context;
+
+pub fn run(context: &Context) -> Result<Verdict> {
+    let findings = measured(context, Effort { seconds: 1.0 })?;
+    context.print(&findings, || render_report::text(&findings))?;
+    Ok(Verdict::Done)
+}
+
+/// Measures, with what has been found so far as progress.
+pub fn measured(context: &Context, effort: Effort) -> Result<Findings> {
+    let bar = context.progress(None)?;
+    let findings = measure(effort, &mut |speed| {
+        bar.println(render_report::line(speed));
+        bar.tick();
+        if context.is_stopped() { Err(Error::Interrupted) } else { Ok(()) }
+    })?;
+    bar.finish_and_clear();
+    Ok(findings)
+}
