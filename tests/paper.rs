@@ -98,8 +98,12 @@ fn the_comparison_has_the_order_that_the_page_states() {
             }
             assert_eq!(ratio(Entrant::PaperUntold(law)), None, "told nothing it does not come home");
         }
-        let across = ratio(Entrant::Vector(VectorLaw::Alv, Law::Lyapunov, Told::Compass)).unwrap();
-        assert!(across < ratio(Entrant::Paper(Law::Proportional)).unwrap(), "the law matters more than the method");
+        // Across laws the order turns with exact bearings; with those from images it depends on the extractor, and the page
+        // counts it.
+        if matches!(source, Source::Points) {
+            let across = ratio(Entrant::Vector(VectorLaw::Alv, Law::Lyapunov, Told::Compass)).unwrap();
+            assert!(across < ratio(Entrant::Paper(Law::Proportional)).unwrap(), "the law matters more than the method");
+        }
     }
     // Exact odometry from the true start needs no bearings.
     let claims = image_claims(&case);

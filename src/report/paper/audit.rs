@@ -179,7 +179,7 @@ fn rows(e: &Evidence<'_>) -> Vec<Row> {
             ),
             condition: "told the true start; others with compass or nothing; 10 cm/s, pi rad/s, Ts = 10 ms, bearings from images",
             command: "wayhome reproduce fig8",
-            verdict: "holds in the mean at equal laws, by a few percent; not always, and the law matters more than the method",
+            verdict: "holds in the mean at equal laws, by a few percent; not always",
         },
         Row {
             claim: "Faster convergence is \"due to good state estimation\" (IV-C)",
