@@ -61,7 +61,7 @@ pub fn text(findings: &Findings) -> String {
     text
 }
 
-/// Heading of [`line`].
+/// Heading of [`line()`].
 #[must_use]
 pub fn header() -> String {
     format!("{:14} {:>10} {:>7} {:>12} {:>12} {:>15}", "", "size", "threads", "panoramas/s", "colours MB/s", "share of memset")
