@@ -57,7 +57,7 @@
 //!
 //! Each module imports only what lies below it. From the top: the command line; `report`; `study`; `episode`; then side by
 //! side and blind to one another `physics`, `render`, `vision`, `estimation` and `control`; then `world`, `panorama` and
-//! `observation`; at the bottom [`geometry`], [`random`] streams and [`error`]s.
+//! `observation`; at the bottom [`geometry`], [`ode`], [`random`] streams and [`error`]s.
 //!
 //! # Units and randomness
 //!
@@ -70,7 +70,9 @@ pub mod error;
 pub mod estimation;
 pub mod geometry;
 pub mod observation;
+pub mod ode;
 pub mod panorama;
+pub mod panorama_set;
 pub mod physics;
 pub mod random;
 pub mod render;

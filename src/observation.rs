@@ -46,6 +46,8 @@ pub struct Observation<'a> {
     pub odometry: Odometry,
     /// Bearings seen now, each id at most once. May hold wrong matches.
     pub bearings: &'a [Bearing],
+    /// Heading in the home frame as a compass tells it, rad; `None` for a robot without one.
+    pub compass_rad: Option<f64>,
 }
 
 /// The robot's data sheet, as its maker would state it.

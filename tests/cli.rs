@@ -391,6 +391,77 @@ fn a_table_of_commands_is_driven_and_recorded() {
     assert!(!folder.path().join("results").exists(), "a failure leaves no folder behind");
 }
 
+/// Every file of a folder with its bytes, by name.
+fn files(folder: &Path) -> Vec<(String, Vec<u8>)> {
+    let mut held: Vec<_> = std::fs::read_dir(folder)
+        .unwrap()
+        .map(|entry| entry.unwrap().path())
+        .map(|path| (path.file_name().unwrap().to_string_lossy().into_owned(), std::fs::read(&path).unwrap()))
+        .collect();
+    held.sort();
+    held
+}
+
+#[test]
+fn parts_of_the_paper_are_reproduced_to_the_same_bytes() {
+    let folder = tempfile::tempdir().unwrap();
+    assert_done(&run(folder.path(), &["reproduce", "fig3", "observability", "--threads", "1", "--out", "one"]));
+    let two = run(folder.path(), &["reproduce", "observability", "fig3", "--threads", "3", "--out", "two", "--json"]);
+    assert_done(&two);
+    assert_eq!(files(&folder.path().join("one")), files(&folder.path().join("two")));
+    let printed: Value = serde_json::from_slice(&two.stdout).unwrap();
+    assert_eq!(printed["sections"][0]["target"], "fig3");
+    // A part takes its place in the page; the others stay.
+    assert_done(&run(folder.path(), &["reproduce", "table1", "--out", "one"]));
+    let page = std::fs::read_to_string(folder.path().join("one/README.md")).unwrap();
+    let at = |heading: &str| page.find(heading).unwrap_or_else(|| panic!("{heading}: {page}"));
+    assert!(at("## Table I") < at("## Fig. 3") && at("## Fig. 3") < at("## Observability"));
+    assert!(folder.path().join("one/observability-homeward.svg").is_file());
+}
+
+#[test]
+fn a_set_of_panoramas_is_checked_before_anything_is_written() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::create_dir(folder.path().join("set")).unwrap();
+    let reproduce = |target: &str, set: &str| run(folder.path(), &["reproduce", target, "--dataset", set]);
+    assert_fails(&reproduce("fig8", "set"), 2, &["--dataset", "fig8", "fig7"]);
+    assert_fails(&reproduce("fig7", "nowhere"), 1, &["nowhere"]);
+    assert_fails(&reproduce("fig7", "set"), 1, &["set", "<i>_<j>.pgm"]);
+    assert_fails(&reproduce("fig9", "set"), 2, &["fig9", "table1"]);
+    std::fs::write(folder.path().join("set/0_0.pgm"), "P5\n4 2\n255\n12345678").unwrap();
+    assert_fails(&reproduce("fig7", "set"), 2, &["1 x 1", "10 x 17"]);
+    assert!(!folder.path().join("results").exists());
+}
+
+#[test]
+fn methods_are_compared_from_the_same_starts() {
+    let folder = tempfile::tempdir().unwrap();
+    let common = ["compare", "paper-ideal", "--plant", "unicycle", "--bearings", "ideal", "--seeds", "1..3", "--places", "9"];
+    let chosen = ["--contenders", "paper-ekf-told,alv-compass", "--json"];
+    let compare = |threads: &str, out: &str| {
+        let output = run(folder.path(), &[&common[..], &chosen[..], &["--threads", threads, "--out", out]].concat());
+        assert_done(&output);
+        serde_json::from_slice::<Value>(&output.stdout).unwrap()
+    };
+    let (one, two) = (compare("1", "one"), compare("2", "two"));
+    assert_eq!(one["standings"], two["standings"]);
+    assert_eq!((&one["standings"][0]["home"], &one["standings"][1]["runs"]), (&Value::from(3), &Value::from(3)));
+    let names: Vec<String> = files(&folder.path().join("one")).into_iter().map(|(name, _)| name).collect();
+    assert_eq!(names, [".wayhome", "README.md", "compare.csv", "compare.svg", "map-alv-compass.svg", "map-paper-ekf-told.svg"]);
+    assert_fails(&run(folder.path(), &["compare", "--contenders", "nobody"]), 2, &["nobody", "anchored-ekf"]);
+}
+
+#[test]
+fn observability_is_mapped_for_any_world() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = run(folder.path(), &["observability", LAB, "--spacing-m", "0.5", "--heading-deg", "-30", "--out", "map"]);
+    assert_done(&output);
+    assert!(String::from_utf8_lossy(&output.stdout).contains("full rank"));
+    let table = std::fs::read_to_string(folder.path().join("map/observability.csv")).unwrap();
+    assert_eq!(table.lines().count(), 1 + 14 * 12);
+    assert_fails(&run(folder.path(), &["observability", "lab", "--spacing-m", "0.001"]), 2, &["0.001", "250000"]);
+}
+
 #[test]
 fn the_physics_report_holds_its_closed_forms() {
     let folder = tempfile::tempdir().unwrap();

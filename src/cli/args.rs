@@ -9,6 +9,7 @@ use wayhome::episode::method::{LawKind, MethodKind};
 use wayhome::episode::{Bearings, Look, PlantKind, Start};
 use wayhome::geometry::Pose;
 use wayhome::render::RendererChoice;
+use wayhome::report::paper::Target;
 use wayhome::study::robustness::Axis;
 use wayhome::study::vision::conditions::Axis as VisionAxis;
 use wayhome::vision::Landmarks;
@@ -73,6 +74,13 @@ pub enum Command {
     Drive(DriveArgs),
     /// Hold the physics against its closed forms: a page of charts, and the slip map
     PhysicsReport(PhysicsReportArgs),
+    /// Every method from the same starts: success, time, path, final error, AAE, catchment area
+    #[command(after_help = EXIT_CODES)]
+    Compare(Box<super::compare::CompareArgs>),
+    /// Rebuild the paper's tables and figures beside the printed numbers, and audit its claims
+    Reproduce(super::reproduce::ReproduceArgs),
+    /// Where the paper's state can be told from bearings and motion: rank and condition over a room
+    Observability(super::observability::ObservabilityArgs),
     /// Success against conditions that worsen one at a time, as a table and a picture
     #[command(after_help = EXIT_CODES)]
     Robustness(Box<RobustnessArgs>),
@@ -136,6 +144,9 @@ pub struct HomeArgs {
     /// Pose in the home frame at which a filter starts that has to be given one (paper-ekf): x,y,heading_deg
     #[arg(long, value_name = "x,y,heading_deg", allow_hyphen_values = true, value_parser = pose)]
     pub initial_estimate: Option<Pose>,
+    /// Give the robot a compass with readings of this standard deviation, degrees; methods without an estimate use it
+    #[arg(long, value_name = "DEG", allow_negative_numbers = true, value_parser = not_negative)]
+    pub compass_deg: Option<f64>,
     /// Time limit, s [default: the world's]
     #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = positive)]
     pub time_limit_s: Option<f64>,
@@ -334,14 +345,14 @@ pub enum WorldCommand {
 }
 
 /// A value of the library, what it is called here, and what `--help` says of it.
-type Choice<T> = (T, &'static str, &'static str);
+pub type Choice<T> = (T, &'static str, &'static str);
 
-const PLANTS: &[Choice<PlantKind>] = &[
+pub const PLANTS: &[Choice<PlantKind>] = &[
     (PlantKind::Rapier, "rapier", "Wheels that slip, motors, encoders, collisions"),
     (PlantKind::Unicycle, "unicycle", "The unicycle's kinematics with perfect odometry; nothing stops it"),
 ];
 
-const BEARINGS: &[Choice<Bearings>] = &[
+pub const BEARINGS: &[Choice<Bearings>] = &[
     (Bearings::Rendered, "rendered", "Features of rendered panoramas, found again from the home panorama"),
     (Bearings::Ideal, "ideal", "True bearings of the landmark bodies' centres, where nothing hides them"),
     (Bearings::Noisy, "noisy", "Ideal bearings with noise, drop-outs and false matches"),
@@ -350,7 +361,10 @@ const BEARINGS: &[Choice<Bearings>] = &[
 const METHODS: &[Choice<MethodKind>] = &[
     (MethodKind::AnchoredEkf, "anchored-ekf", "Filter that starts from nothing and anchors home when it can"),
     (MethodKind::PaperEkf, "paper-ekf", "The paper's filter on three landmarks, started at a supposed pose"),
-    (MethodKind::Alv, "alv", "Average landmark vector without a compass; no estimate"),
+    (MethodKind::Alv, "alv", "Average landmark vector; no estimate"),
+    (MethodKind::TronDaniilidis, "tron-daniilidis", "Tron and Daniilidis' descent on bearings; no estimate"),
+    (MethodKind::Weber, "weber", "Weber's bearing vectors; no estimate"),
+    (MethodKind::Ibvs, "ibvs", "Visual servoing with one constant range; no estimate"),
 ];
 
 const LAWS: &[Choice<LawKind>] = &[
@@ -358,7 +372,7 @@ const LAWS: &[Choice<LawKind>] = &[
     (LawKind::Lyapunov, "lyapunov", "The paper's switching law"),
 ];
 
-const RENDERERS: &[Choice<RendererChoice>] = &[
+pub const RENDERERS: &[Choice<RendererChoice>] = &[
     (RendererChoice::Auto, "auto", "A hardware GPU where there is one, else the CPU"),
     (RendererChoice::Gpu, "gpu", "Any graphics adapter, a software one included"),
     (RendererChoice::Cpu, "cpu", "The CPU"),
@@ -403,15 +417,28 @@ const AXES: &[Choice<Axis>] = &[
     (Axis::Noise, "noise", "Noise added to bearings, 0.05 to 2 degrees"),
 ];
 
+/// What `reproduce` calls what it can; `None` is all of it.
+pub const TARGETS: &[Choice<Option<Target>>] = &[
+    (Some(Target::Table1), "table1", "Table I: errors with accurate bearings"),
+    (Some(Target::Fig3), "fig3", "Fig. 3: paths with accurate bearings"),
+    (Some(Target::Table2), "table2", "Table II: errors with bearings from images, the paper's own set"),
+    (Some(Target::Fig5), "fig5", "Fig. 5: paths on that set"),
+    (Some(Target::Fig7), "fig7", "Fig. 7: paths on Vardy's set"),
+    (Some(Target::Fig8), "fig8", "Fig. 8: time home beside other methods"),
+    (Some(Target::Observability), "observability", "Rank and condition of the matrix O"),
+    (Some(Target::Audit), "audit", "A row for each claim: what holds, from which start, under which noise"),
+    (None, "all", "All of these"),
+];
+
 /// Reads one of `choices` by its name.
-fn choice<T: Copy + Send + Sync + 'static>(choices: &'static [Choice<T>]) -> impl TypedValueParser<Value = T> {
+pub fn choice<T: Copy + Send + Sync + 'static>(choices: &'static [Choice<T>]) -> impl TypedValueParser<Value = T> {
     let names = choices.iter().map(|(_, name, help)| PossibleValue::new(*name).help(*help));
     PossibleValuesParser::new(names)
         .try_map(|given| choices.iter().find(|(_, name, _)| *name == given).map(|(value, ..)| *value).ok_or("unknown name"))
 }
 
 /// What the command line calls one of `choices`.
-fn name_of<T: PartialEq>(choices: &[Choice<T>], wanted: &T) -> &'static str {
+pub fn name_of<T: PartialEq>(choices: &[Choice<T>], wanted: &T) -> &'static str {
     choices.iter().find(|(value, ..)| value == wanted).map_or("", |(_, name, _)| name)
 }
 
@@ -445,15 +472,15 @@ pub fn quoted(word: &str) -> String {
 }
 
 /// A finite number.
-fn number(text: &str) -> Result<f64, String> {
+pub fn number(text: &str) -> Result<f64, String> {
     text.trim().parse().ok().filter(|v: &f64| v.is_finite()).ok_or_else(|| format!("`{text}` is not a finite number"))
 }
 
-fn positive(text: &str) -> Result<f64, String> {
+pub fn positive(text: &str) -> Result<f64, String> {
     number(text).and_then(|v| if v > 0.0 { Ok(v) } else { Err("must be greater than 0".into()) })
 }
 
-fn not_negative(text: &str) -> Result<f64, String> {
+pub fn not_negative(text: &str) -> Result<f64, String> {
     number(text).and_then(|v| if v >= 0.0 { Ok(v) } else { Err("must not be negative".into()) })
 }
 
@@ -484,7 +511,7 @@ fn keypoints(text: &str) -> Result<usize, String> {
 }
 
 /// `WxH` in pixels.
-fn size(text: &str) -> Result<(u32, u32), String> {
+pub fn size(text: &str) -> Result<(u32, u32), String> {
     let (width, height) = text
         .split_once('x')
         .and_then(|(w, h)| Some((w.parse::<u32>().ok()?, h.parse::<u32>().ok()?)))
@@ -499,7 +526,7 @@ fn size(text: &str) -> Result<(u32, u32), String> {
 const MOST_SEEDS: u64 = 100_000;
 
 /// `A..B`, both ends included.
-fn seeds(text: &str) -> Result<RangeInclusive<u64>, String> {
+pub fn seeds(text: &str) -> Result<RangeInclusive<u64>, String> {
     let (first, last) = text
         .split_once("..")
         .and_then(|(a, b)| Some((a.parse::<u64>().ok()?, b.strip_prefix('=').unwrap_or(b).parse::<u64>().ok()?)))

@@ -114,6 +114,7 @@ fn setup(args: &HomeArgs) -> Result<Setup, Error> {
             dropout: args.noise_dropout.unwrap_or(usual.dropout),
             false_match: args.noise_false.unwrap_or(usual.false_match),
         },
+        compass_sd_rad: args.compass_deg.map(f64::to_radians),
         start: args.start.clone(),
         initial_estimate: args.initial_estimate,
         time_limit_s: args.time_limit_s,

@@ -5,11 +5,14 @@
 
 pub mod args;
 mod bound;
+mod compare;
 mod context;
 mod drive;
 mod home;
+mod observability;
 mod physics_report;
 mod render;
+mod reproduce;
 mod robustness;
 mod vision_report;
 mod world;
@@ -37,6 +40,9 @@ pub fn run(args: Args) -> Result<Verdict> {
         Command::PhysicsReport(args) => physics_report::run(&args, &context),
         Command::Robustness(args) => robustness::run(&args, &context),
         Command::Bound(args) => bound::run(&args, &context),
+        Command::Compare(args) => compare::run(&args, &context),
+        Command::Observability(args) => observability::run(&args, &context),
+        Command::Reproduce(args) => reproduce::run(&args, &context),
         Command::Render(args) => render::run(&args, &context),
         Command::VisionReport(args) => vision_report::run(&args, &context),
         Command::World(args) => world::run(&args, &context),

@@ -1,6 +1,13 @@
 //! Control laws: from the believed pose to wheel commands.
 //!
 //! A law steers; a governor sets the speed. Both see only an estimate's pose and the data sheets, never the simulator.
+//! [`printed`] has the paper's laws as they stand in the paper, for its reproduction; [`vectors`] the laws that make a direction
+//! of bearings alone.
+
+pub mod printed;
+pub mod vectors;
+
+pub mod escape;
 
 use crate::geometry::{Pose, Twist, angle_of, wrap};
 use crate::observation::{RobotSheet, TaskSheet};

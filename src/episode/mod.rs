@@ -17,7 +17,7 @@ pub mod sensor;
 mod setup;
 mod summary;
 
-pub use record::{Outcome, Pictures, Record, Step, Timing};
+pub use record::{Belief, Outcome, Pictures, Record, Step, Timing};
 pub use run::{Parts, Progress, run};
 pub use sensor::Sensor;
 pub use setup::{Bearings, Bench, Look, PlantKind, Setup, Start};

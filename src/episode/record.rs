@@ -65,6 +65,47 @@ pub struct Step {
     pub nis: f64,
 }
 
+/// What a method with an estimate is about.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Belief {
+    /// Home is not found yet.
+    Searching,
+    /// There is an estimate.
+    Homing,
+    /// There was one, and it no longer explains what is seen.
+    Lost,
+}
+
+impl Belief {
+    /// Lower-case name, as files have it.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Searching => "searching",
+            Self::Homing => "homing",
+            Self::Lost => "lost",
+        }
+    }
+
+    /// The belief at each step; `None` while the robot coasts to rest, and all through for a method that never has an estimate.
+    #[must_use]
+    pub fn of_steps(steps: &[Step]) -> Vec<Option<Self>> {
+        let mut found = false;
+        let ever = steps.iter().any(|s| s.estimate.is_some());
+        let belief = |step: &Step| {
+            found |= step.estimate.is_some();
+            let state = match (step.estimate, found) {
+                (Some(_), _) => Self::Homing,
+                (None, false) => Self::Searching,
+                (None, true) => Self::Lost,
+            };
+            (ever && step.seen.is_some()).then_some(state)
+        };
+        steps.iter().map(belief).collect()
+    }
+}
+
 /// Wall-clock time that an episode took, by part, s. Alone in a record in that it differs from run to run.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct Timing {

@@ -70,7 +70,9 @@ pub fn run(
         let truth = drive.plant.truth();
         let bearings = parts.sensor.observe(truth, drive.plant.body_poses())?;
         let deciding = Instant::now();
-        let decision = parts.method.step(&Observation { time_s, odometry: drive.odometry, bearings: &bearings });
+        let compass_rad = parts.sensor.compass_rad(truth);
+        let seen = Observation { time_s, odometry: drive.odometry, bearings: &bearings, compass_rad };
+        let decision = parts.method.step(&seen);
         timing.estimation_s += deciding.elapsed().as_secs_f64();
         if steps.is_empty() {
             pictures.start = parts.sensor.panorama().cloned();

@@ -8,7 +8,9 @@ use serde::Serialize;
 use super::method::{self, LawKind, MethodKind};
 use super::record::Record;
 use super::run::{Parts, Progress, run};
-use super::sensor::{Degradation, DegradedSensor, IdealSensor, Noise, NoisySensor, RenderedSensor, Sensor, Sight};
+use super::sensor::{
+    CompassSensor, Degradation, DegradedSensor, IdealSensor, Noise, NoisySensor, RenderedSensor, Sensor, Sight,
+};
 use crate::error::{Error, Result};
 use crate::geometry::Pose;
 use crate::observation::{Briefing, HomeSnapshot, RobotSheet, TaskSheet};
@@ -118,10 +120,15 @@ pub struct Setup {
     pub noise: Noise,
     /// What is done to the bearings of any sensor on top of that.
     pub degradation: Degradation,
+    /// Standard deviation of the readings of the robot's compass, rad; `None` for a robot without one. Only methods that steer
+    /// by a homing vector read it.
+    pub compass_sd_rad: Option<f64>,
     /// Where runs start.
     pub start: Start,
     /// Pose in the home frame that a method starts from which wants one.
     pub initial_estimate: Option<Pose>,
+    /// Whether such a method is told the true start instead: a condition of a comparison, not something a robot has.
+    pub told_start: bool,
     /// Time limit where it differs from the world's, s.
     pub time_limit_s: Option<f64>,
 }
@@ -140,8 +147,10 @@ impl Default for Setup {
             home_look: Look::default(),
             noise: Noise::default(),
             degradation: Degradation::default(),
+            compass_sd_rad: None,
             start: Start::Random,
             initial_estimate: None,
+            told_start: false,
             time_limit_s: None,
         }
     }
@@ -241,12 +250,35 @@ impl<'a> Bench<'a> {
     /// When there is no such start, the method cannot be built from what the setup gives it, the renderer fails, or `watch`
     /// breaks.
     pub fn run(&mut self, seed: u64, watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>) -> Result<Record> {
+        let start = self.setup.start_pose(self.world, Seed(seed))?;
+        self.run_from(seed, start, watch)
+    }
+
+    /// Runs the episode of one seed from a pose in the room, whatever start the setup names.
+    ///
+    /// # Errors
+    /// As [`Bench::run`].
+    pub fn run_from(&mut self, seed: u64, start: Pose, watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>) -> Result<Record> {
         let (world, setup, seed) = (self.world, self.setup, Seed(seed));
-        let start = setup.start_pose(world, seed)?;
         let mut plant: Box<dyn Plant> = match setup.plant {
             PlantKind::Rapier => Box::new(RapierPlant::new(world, start, seed)),
             PlantKind::Unicycle => Box::new(UnicyclePlant::new(world, start, seed)),
         };
+        let mut sensor = self.sensor(seed)?;
+        let task = setup.task(world);
+        let briefing = setup.briefing(world, sensor.home().clone());
+        let initial = if setup.told_start { Some(world.home.to_local(&start)) } else { setup.initial_estimate };
+        let mut method = method::build(setup.method, setup.law, briefing, initial)?;
+        let parts = Parts { plant: plant.as_mut(), sensor: sensor.as_mut(), method: method.as_mut() };
+        run(parts, world.home, &task, watch)
+    }
+
+    /// The setup's sensor for the run of one seed.
+    ///
+    /// # Errors
+    /// When the renderer fails or the setup asks for faults that cannot be.
+    pub fn sensor(&mut self, seed: Seed) -> Result<Box<dyn Sensor + '_>> {
+        let (world, setup) = (self.world, self.setup);
         let ideal = || IdealSensor::new(world);
         let mut sensor: Box<dyn Sensor + '_> = match &mut self.camera {
             Some(Camera { scenes: [home, now], renderer }) => {
@@ -264,11 +296,10 @@ impl<'a> Bench<'a> {
         if !setup.degradation.is_none() {
             sensor = Box::new(DegradedSensor::new(sensor, setup.degradation, seed)?);
         }
-        let task = setup.task(world);
-        let briefing = setup.briefing(world, sensor.home().clone());
-        let mut method = method::build(setup.method, setup.law, briefing, setup.initial_estimate)?;
-        let parts = Parts { plant: plant.as_mut(), sensor: sensor.as_mut(), method: method.as_mut() };
-        run(parts, world.home, &task, watch)
+        if let Some(sd_rad) = setup.compass_sd_rad {
+            sensor = Box::new(CompassSensor::new(sensor, world.home, sd_rad, seed)?);
+        }
+        Ok(sensor)
     }
 }
 

@@ -114,6 +114,9 @@ pub struct SetupRecord {
     pub method: MethodKind,
     /// Steering law.
     pub controller: LawKind,
+    /// Standard deviation of the compass, rad; left out for a robot without one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub compass_sd_rad: Option<f64>,
     /// Columns and rows of the panorama; `None` for a sensor without a camera.
     pub size_px: Option<[u32; 2]>,
     /// Light at home and on the way; `None` for a sensor without a camera.
@@ -140,6 +143,7 @@ impl SetupRecord {
             bearings: setup.bearings,
             method: setup.method,
             controller: setup.law,
+            compass_sd_rad: setup.compass_sd_rad,
             size_px: rendered.then_some([projection.width, projection.height]),
             light: rendered.then(|| setup.looks().map(|look| look.light(world))),
             camera: rendered.then(|| setup.looks().map(|look| look.camera(world))),

@@ -2,9 +2,11 @@
 //!
 //! - [`anchored`]: the filter of the main job; nothing needs to be known at the start.
 //! - [`paper`]: the paper's six-state EKF, exactly as printed but for the transition Jacobian; it must be started near the truth.
+//! - [`observability`]: what of the paper's state its bearings can tell at all.
 //! - [`resection`] and [`gaussian`] serve the anchored filter.
 
 pub mod anchored;
 pub mod gaussian;
+pub mod observability;
 pub mod paper;
 pub mod resection;

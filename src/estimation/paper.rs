@@ -7,13 +7,15 @@
 //! theta_i' = v sin(theta_i) sin(theta_i* - theta_i - alpha) / (R sin(theta - theta_i*)) - omega.
 //!
 //! Two departures from the printed text. The text prints the covariance prediction with G = dg/dX; a discrete filter needs the
-//! transition Jacobian, so I + Ts dg/dX stands here. And the model is singular at home and on the lines through home and a
-//! landmark; there the denominators are held away from zero, so that no state ever becomes NaN.
+//! transition Jacobian, so I + Ts dg/dX stands here, and the printed one is kept as [`Transition::Printed`] to show what it
+//! does. And the model is singular at home and on the lines through home and a landmark; there the denominators are held away
+//! from zero, so that no state ever becomes NaN.
 
 use nalgebra::{SMatrix, SVector};
 
 use crate::geometry::{Pose, Twist, sin_cos, wrap};
 use crate::observation::Estimate;
+use crate::ode::{Tolerance, integrate};
 
 /// The state vector X.
 pub type State = SVector<f64, 6>;
@@ -22,8 +24,6 @@ pub type Matrix = SMatrix<f64, 6, 6>;
 
 /// Smallest R (m) and smallest |sin(theta - theta_i*)| that the model divides by.
 const SMALLEST: f64 = 1e-3;
-/// Steps of the Runge-Kutta integration of one sampling interval.
-const SUBSTEPS: usize = 10;
 
 /// Noise settings; defaults are the paper's for ideal conditions (Q = 0.01 I, M = 0.1 I, P0 = I, as printed, in cm and rad).
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -34,11 +34,39 @@ pub struct PaperSettings {
     pub measurement: f64,
     /// Initial covariance, on the diagonal of P(0|0).
     pub initial: f64,
+    /// Jacobian of the covariance prediction.
+    pub transition: Transition,
+    /// How the mean is predicted.
+    pub prediction: Prediction,
+}
+
+/// The G of P(k|k-1) = G P G^T + Q.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Transition {
+    /// I + Ts dg/dX, what a discrete filter needs.
+    Discrete,
+    /// dg/dX, as the paper prints it: a rate, not a transition.
+    Printed,
+}
+
+/// How the mean is carried over a sampling interval.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Prediction {
+    /// By Dormand and Prince's method, as the paper has it, to this tolerance.
+    Ode(Tolerance),
+    /// One step of Euler's method.
+    Euler,
 }
 
 impl Default for PaperSettings {
     fn default() -> Self {
-        Self { process: 0.01, measurement: 0.1, initial: 1.0 }
+        Self {
+            process: 0.01,
+            measurement: 0.1,
+            initial: 1.0,
+            transition: Transition::Discrete,
+            prediction: Prediction::Ode(Tolerance::TIGHT),
+        }
     }
 }
 
@@ -146,16 +174,18 @@ impl PaperEkf {
         let before = self.state;
         let u = Twist { v: twist.v * CM, omega: twist.omega };
         let jacobian = dynamics(&self.state, u, &self.home_bearings).1;
-        let transition = Matrix::identity() + jacobian * dt;
-        let h = dt / SUBSTEPS as f64;
-        for _ in 0..SUBSTEPS {
-            let f = |x: &State| dynamics(x, u, &self.home_bearings).0;
-            let k1 = f(&self.state);
-            let k2 = f(&(self.state + k1 * (0.5 * h)));
-            let k3 = f(&(self.state + k2 * (0.5 * h)));
-            let k4 = f(&(self.state + k3 * h));
-            self.state += (k1 + (k2 + k3) * 2.0 + k4) * (h / 6.0);
-        }
+        let transition = match self.settings.transition {
+            Transition::Discrete => Matrix::identity() + jacobian * dt,
+            Transition::Printed => jacobian,
+        };
+        let slope = |x: &State| dynamics(x, u, &self.home_bearings).0;
+        self.state = match self.settings.prediction {
+            Prediction::Ode(tolerance) => {
+                let slope = |x: &[f64; 6]| slope(&State::from(*x)).into();
+                State::from(integrate(slope, self.state.into(), dt, tolerance))
+            }
+            Prediction::Euler => self.state + slope(&self.state) * dt,
+        };
         self.tame();
         self.covariance = transition * self.covariance * transition.transpose() + Matrix::identity() * self.settings.process;
         // Near a singularity the Jacobian may grow without bound; the filter then starts over from where it was.

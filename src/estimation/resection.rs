@@ -1,7 +1,8 @@
-//! Resection: where was the home snapshot taken, given landmarks whose place is known more or less?
+//! Resection: where was a set of bearings taken, given landmarks whose place is known more or less?
 //!
-//! Each landmark has a Gaussian over (direction, inverse range) seen from the origin of the odometry frame; the snapshot gives
-//! its bearing from the unknown home pose (x, y, heading). Three bearings fix a pose in the plane; many of them are weighed by
+//! It is asked where home is, given the snapshot and what the search has learned of the landmarks; and where the robot is, when
+//! it was carried off and the map is still good. Each landmark has a Gaussian over (direction, inverse range) seen from the
+//! origin of the map; the bearings are from an unknown pose (x, y, heading). Three bearings fix a pose in the plane; many of them are weighed by
 //! what the landmark's own uncertainty does to the predicted bearing. Before the ranges are known this is the constant-range
 //! home vector with its errors stated; as the ranges sharpen it becomes the plain resection. The cost has several minima, so
 //! the search starts from a polar grid.
@@ -21,17 +22,17 @@ pub struct Sighting {
     pub inverse_range: f64,
     /// Covariance of (direction, inverse range).
     pub covariance: Matrix2<f64>,
-    /// Bearing from home, in the home frame, rad.
-    pub home_bearing_rad: f64,
+    /// Bearing of it from the pose that is looked for, rad.
+    pub bearing_rad: f64,
     /// Variance of that bearing, rad^2.
     pub variance: f64,
 }
 
-/// A pose of home that explains the snapshot.
+/// A pose that explains the bearings.
 #[derive(Debug, Clone, Copy)]
 pub struct Hypothesis {
-    /// Home pose in the odometry frame.
-    pub home: Pose,
+    /// The pose in the map's frame.
+    pub pose: Pose,
     /// Negative log likelihood (Student's t residuals), up to a constant; lower is better.
     pub cost: f64,
 }
@@ -55,7 +56,7 @@ impl Sighting {
         let gy = s - self.inverse_range * home.y;
         let n = (gx * gx + gy * gy).max(1e-9);
         let (qx, qy) = (-gy / n, gx / n);
-        let residual = wrap(self.home_bearing_rad - (atan2(gy, gx) - home.heading));
+        let residual = wrap(self.bearing_rad - (atan2(gy, gx) - home.heading));
         let by_direction = -qx * s + qy * c;
         let by_inverse_range = -(qx * home.x + qy * home.y);
         let j = Vector2::new(by_direction, by_inverse_range);
@@ -109,24 +110,24 @@ pub fn position_sd_m(sightings: &[Sighting], home: &Pose) -> f64 {
 
 /// Iteratively reweighted Gauss-Newton with a damping that falls as the cost does.
 fn refine(sightings: &[Sighting], start: Pose, start_cost: f64) -> Hypothesis {
-    let mut best = Hypothesis { home: start, cost: start_cost };
+    let mut best = Hypothesis { pose: start, cost: start_cost };
     let mut damping = 1e-2;
     for _ in 0..15 {
         let mut normal = Matrix3::zeros();
         let mut right = Vector3::zeros();
         for s in sightings {
-            let (r, v, g) = s.residual(&best.home);
+            let (r, v, g) = s.residual(&best.pose);
             let weight = (TAIL + 1.0) / (TAIL + r * r / v) / v;
             normal += weight * g * g.transpose();
             right -= weight * r * g;
         }
         let damped = normal + Matrix3::from_diagonal(&(normal.diagonal() * damping + Vector3::repeat(1e-9)));
         let Some(step) = damped.cholesky().map(|c| c.solve(&right)) else { break };
-        let next = Pose::new(best.home.x + step.x, best.home.y + step.y, best.home.heading + step.z);
+        let next = Pose::new(best.pose.x + step.x, best.pose.y + step.y, best.pose.heading + step.z);
         let next_cost = if next.is_finite() { cost(sightings, &next) } else { f64::INFINITY };
         if next_cost < best.cost {
             let gained = best.cost - next_cost;
-            best = Hypothesis { home: next, cost: next_cost };
+            best = Hypothesis { pose: next, cost: next_cost };
             damping *= 0.2;
             if gained < 1e-6 {
                 break;
@@ -153,20 +154,20 @@ pub fn resect(sightings: &[Sighting], robot: Vector2<f64>, near: Option<Pose>) -
         .iter()
         .flat_map(|&d| (0..START_DIRECTIONS).map(move |k| robot + direction(TAU * k as f64 / START_DIRECTIONS as f64) * d));
     for p in places {
-        let home = Pose::new(p.x, p.y, best_heading(sightings, p.x, p.y));
-        starts.push(Hypothesis { home, cost: cost(sightings, &home) });
+        let pose = Pose::new(p.x, p.y, best_heading(sightings, p.x, p.y));
+        starts.push(Hypothesis { pose, cost: cost(sightings, &pose) });
     }
     starts.sort_by(|a, b| a.cost.total_cmp(&b.cost));
     starts.truncate(REFINED);
-    if let Some(home) = near {
-        starts.push(Hypothesis { home, cost: cost(sightings, &home) });
+    if let Some(pose) = near {
+        starts.push(Hypothesis { pose, cost: cost(sightings, &pose) });
     }
     let mut found: Vec<Hypothesis> = Vec::new();
     for start in starts {
-        let candidate = refine(sightings, start.home, start.cost);
+        let candidate = refine(sightings, start.pose, start.cost);
         let twin = found.iter_mut().find(|h| {
-            (h.home.position() - candidate.home.position()).norm() < SAME_M
-                && wrap(h.home.heading - candidate.home.heading).abs() < SAME_M
+            (h.pose.position() - candidate.pose.position()).norm() < SAME_M
+                && wrap(h.pose.heading - candidate.pose.heading).abs() < SAME_M
         });
         match twin {
             Some(known) if known.cost <= candidate.cost => {}
@@ -195,12 +196,12 @@ mod tests {
                         direction_rad: atan2(y, x),
                         inverse_range: 1.0 / libm::hypot(x, y),
                         covariance: Matrix2::identity() * 1e-8,
-                        home_bearing_rad: atan2(seen.y, seen.x),
+                        bearing_rad: atan2(seen.y, seen.x),
                         variance: 1e-8,
                     }
                 })
                 .collect();
-            let best = resect(&sightings, Vector2::zeros(), None)[0].home;
+            let best = resect(&sightings, Vector2::zeros(), None)[0].pose;
             assert!((best.position() - home.position()).norm() < 1e-6, "{best:?} {home:?}");
             assert!(wrap(best.heading - home.heading).abs() < 1e-6);
         }

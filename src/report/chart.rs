@@ -15,12 +15,14 @@
 //! ```
 
 mod axis;
+mod bars;
 mod ramp;
 
 use svg::node::element::{Circle, ClipPath, Definitions, Group, Line, Polyline, Rectangle, Text};
 
 pub use axis::Axis;
 use axis::Placed;
+pub use bars::{BarSeries, Bars};
 pub use ramp::Ramp;
 
 /// Size of a chart, px.

@@ -19,6 +19,7 @@
 //! # }
 //! ```
 
+mod field;
 mod frame;
 mod labels;
 mod legend;
@@ -62,6 +63,9 @@ impl PathStyle {
 pub struct MapDrawing {
     frame: Frame,
     title: Option<String>,
+    floor: Group,
+    /// Lies on the floor, below all bodies.
+    field: Group,
     scenery: Group,
     /// Ellipses lie below paths, whatever the order in which they come.
     ellipses: Group,
@@ -79,6 +83,8 @@ impl MapDrawing {
         let mut drawing = Self {
             frame: Frame::around(&world.outline),
             title: None,
+            floor: Group::new(),
+            field: Group::new(),
             scenery: Group::new(),
             ellipses: Group::new(),
             paths: Group::new(),
@@ -169,6 +175,8 @@ impl MapDrawing {
         let legend = self.legend.draw(top + self.frame.height_px() + frame::AXIS_PX, WIDTH_PX);
         let map = Group::new()
             .set("transform", format!("translate(0 {top})"))
+            .add(self.floor.clone())
+            .add(self.field.clone())
             .add(self.scenery.clone())
             .add(self.ellipses.clone())
             .add(self.paths.clone())

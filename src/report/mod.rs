@@ -5,10 +5,12 @@
 
 pub mod bound;
 pub mod chart;
+pub mod compare;
 pub mod drive;
 mod folder;
 pub mod image;
 pub mod map;
+pub mod paper;
 mod path_plot;
 pub mod physics;
 pub mod robustness;

@@ -3,7 +3,7 @@
 use super::image::colours_png;
 use super::path_plot::path_svg;
 use super::{OutputFolder, json};
-use crate::episode::{Record, Step, Summary};
+use crate::episode::{Belief, Record, Step, Summary};
 use crate::error::Result;
 use crate::world::World;
 
@@ -12,7 +12,7 @@ pub const FILES: &[&str] =
     &["summary.json", "trajectory.csv", "path.svg", "home.png", "panorama_start.png", "panorama_end.png"];
 
 /// Columns of `trajectory.csv`.
-const COLUMNS: [&str; 19] = [
+const COLUMNS: [&str; 20] = [
     "t_s",
     "x_m",
     "y_m",
@@ -32,6 +32,7 @@ const COLUMNS: [&str; 19] = [
     "matched",
     "rejected",
     "nis",
+    "belief",
 ];
 
 /// Writes all files of a run.
@@ -60,15 +61,17 @@ pub fn write(mut folder: OutputFolder, world: &World, record: &Record, summary: 
 pub fn trajectory_csv(steps: &[Step]) -> String {
     let mut text = COLUMNS.join(",");
     text.push('\n');
-    for step in steps {
+    for (step, belief) in steps.iter().zip(Belief::of_steps(steps)) {
         let cells = row(step).map(|value| value.filter(|v| v.is_finite()).map_or_else(String::new, |v| v.to_string()));
         text.push_str(&cells.join(","));
+        text.push(',');
+        text.push_str(belief.map_or("", Belief::name));
         text.push('\n');
     }
     text
 }
 
-/// The numbers of one step in the order of [`COLUMNS`].
+/// The numbers of one step in the order of [`COLUMNS`], all but the last.
 fn row(step: &Step) -> [Option<f64>; 19] {
     let estimate = step.estimate.as_ref();
     let observed = |count: usize| step.seen.map(|_| count as f64);

@@ -23,7 +23,7 @@ use crate::episode::sensor::{IdealSensor, Noise, NoisySensor, Sensor};
 use crate::episode::{BeliefError, Parts, PlantKind, Setup, Start, run};
 use crate::error::{Error, Result};
 use crate::estimation::anchored::map::Prior;
-use crate::estimation::anchored::motion::Motion;
+use crate::estimation::anchored::motion::{Motion, SlipWatch};
 use crate::estimation::anchored::smoother::{Frame, Iterate, Sighting, Stretch};
 use crate::estimation::anchored::{AnchoredFilter, FilterSettings};
 use crate::geometry::{Matrix3, Pose, angle_of};
@@ -83,10 +83,11 @@ impl BoundSettings {
         }
     }
 
-    fn filter(&self) -> FilterSettings {
+    fn filter(&self, world: &World) -> FilterSettings {
         FilterSettings {
             speed_noise_share: self.odometry_share,
             turn_noise_share: self.odometry_share,
+            track_m: world.spec.robot.track_m,
             ..FilterSettings::default()
         }
     }
@@ -263,6 +264,15 @@ impl Path {
         Ok(Self { home: world.home, period_s: task.control_period_s, steps })
     }
 
+    /// The steps as the filter's motion model has them.
+    fn motions(&self, settings: &FilterSettings) -> impl Iterator<Item = Motion> {
+        let (mut slip, settings) = (SlipWatch::default(), *settings);
+        self.steps.iter().map(move |step| {
+            let slip_m_s = slip.expect(&step.odometry, &settings);
+            Motion::from_odometry(&step.odometry, slip_m_s, &settings)
+        })
+    }
+
     /// True pose in the home frame at step `k`.
     fn truth(&self, k: usize) -> Pose {
         self.home.to_local(&self.steps[k].truth)
@@ -295,11 +305,10 @@ impl Path {
             })
             .collect();
         let frames: Vec<Frame> = self
-            .steps
-            .iter()
+            .motions(&settings.filter(world))
             .zip(&seen)
-            .map(|(step, seen)| Frame {
-                motion: Motion::from_odometry(&step.odometry, &settings.filter()),
+            .map(|(motion, seen)| Frame {
+                motion,
                 sightings: seen
                     .iter()
                     .map(|b| Sighting { landmark: index[&b.id], azimuth_rad: b.azimuth_rad, variance })
@@ -327,13 +336,14 @@ impl Path {
         let seed = seed.derive("bound");
         let mut straying = seed.stream("straying");
         let mut sensor = NoisySensor::new(IdealSensor::new(world), world.landmark_count, settings.noise(), seed);
-        let mut filter = AnchoredFilter::new(settings.filter(), sensor.home());
+        let filter_settings = settings.filter(world);
+        let mut filter = AnchoredFilter::new(filter_settings, sensor.home());
         let mut truth = self.steps[0].truth;
         self.steps
             .iter()
-            .map(|step| {
+            .zip(self.motions(&filter_settings))
+            .map(|(step, motion)| {
                 if step.odometry.dt_s > 0.0 {
-                    let motion = Motion::from_odometry(&step.odometry, &settings.filter());
                     truth = truth.compose(&strayed(&motion, &mut straying));
                 }
                 filter.step(&step.odometry, &sensor.observe(truth, &step.bodies)?);

@@ -1,6 +1,9 @@
 //! Studies: many episodes, and what they say together.
 
 pub mod bound;
+pub mod compare;
+pub mod observability;
+pub mod paper;
 pub mod physics;
 pub mod robustness;
 pub mod seeds;

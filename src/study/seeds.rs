@@ -1,13 +1,14 @@
 //! The same setup over a range of seeds, in parallel.
 
 use std::ops::{ControlFlow, RangeInclusive};
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use serde::Serialize;
 
 use super::statistics::{quantile, wilson_95};
 use crate::episode::{Bench, Outcome, Progress, Setup, SetupRecord, Summary};
 use crate::error::{Error, Result};
+use crate::geometry::Pose;
 use crate::world::World;
 
 /// What a watcher of a batch is told.
@@ -19,13 +20,10 @@ pub enum SeedEvent<'a> {
     Done(&'a Summary),
 }
 
-/// Runs every seed of the range and returns the summaries in the order of the seeds.
-///
-/// Each of `threads` workers takes the next seed when it is done with one, and computes it alone: what a seed gives depends on
-/// neither the number of workers nor their order. `watch` is called from all of them.
+/// Runs every seed of the range and returns the summaries in the order of the seeds, as [`run_jobs`] does.
 ///
 /// # Errors
-/// The first error of a run; [`Error::Interrupted`] when `watch` breaks. The other runs are then given up.
+/// As [`run_jobs`].
 pub fn run_seeds(
     world: &World,
     setup: &Setup,
@@ -33,32 +31,62 @@ pub fn run_seeds(
     threads: usize,
     watch: &(dyn Fn(SeedEvent<'_>) -> ControlFlow<()> + Sync),
 ) -> Result<Vec<Summary>> {
-    let count = usize::try_from(seeds.end().saturating_sub(*seeds.start())).map_or(usize::MAX, |n| n.saturating_add(1));
+    let jobs: Vec<Job> = seeds.map(|seed| Job { seed, start: None }).collect();
+    run_jobs(world, setup, &jobs, threads, watch)
+}
+
+/// One run of a batch.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Job {
+    /// Its seed.
+    pub seed: u64,
+    /// Where it starts in the room; `None` for the setup's start.
+    pub start: Option<Pose>,
+}
+
+/// Runs every job and returns the summaries in the order of the jobs.
+///
+/// Each of `threads` workers takes the next job when it is done with one, and computes it alone: what a job gives depends on
+/// neither the number of workers nor their order. `watch` is called from all of them.
+///
+/// # Errors
+/// The first error of a run; [`Error::Interrupted`] when `watch` breaks. The other runs are then given up.
+pub fn run_jobs(
+    world: &World,
+    setup: &Setup,
+    jobs: &[Job],
+    threads: usize,
+    watch: &(dyn Fn(SeedEvent<'_>) -> ControlFlow<()> + Sync),
+) -> Result<Vec<Summary>> {
     let mut benches = vec![Bench::new(world, setup)?];
-    for _ in 1..threads.min(count) {
+    for _ in 1..threads.min(jobs.len()) {
         benches.push(benches[0].another()?);
     }
-    let next = AtomicU64::new(*seeds.start());
+    let next = AtomicUsize::new(0);
     let stop = AtomicBool::new(false);
-    let work = |bench: &mut Bench<'_>| -> Result<Vec<Summary>> {
+    let work = |bench: &mut Bench<'_>| -> Result<Vec<(usize, Summary)>> {
         let mut done = Vec::new();
         loop {
-            let seed = next.fetch_add(1, Ordering::Relaxed);
-            if !seeds.contains(&seed) || stop.load(Ordering::Relaxed) {
+            let index = next.fetch_add(1, Ordering::Relaxed);
+            let Some(&Job { seed, start }) = jobs.get(index).filter(|_| !stop.load(Ordering::Relaxed)) else {
                 return Ok(done);
-            }
-            let record = bench.run(seed, &mut |progress| {
+            };
+            let watch_step = &mut |progress: &Progress| {
                 if stop.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { watch(SeedEvent::Step(progress)) }
-            })?;
+            };
+            let record = match start {
+                Some(start) => bench.run_from(seed, start, watch_step)?,
+                None => bench.run(seed, watch_step)?,
+            };
             let summary = Summary::new(&record, world, setup, seed);
             let carry_on = watch(SeedEvent::Done(&summary));
-            done.push(summary);
+            done.push((index, summary));
             if carry_on.is_break() {
                 return Err(Error::Interrupted);
             }
         }
     };
-    let results: Vec<Result<Vec<Summary>>> = std::thread::scope(|scope| {
+    let results: Vec<Result<Vec<(usize, Summary)>>> = std::thread::scope(|scope| {
         let workers: Vec<_> = benches
             .into_iter()
             .map(|mut bench| {
@@ -90,8 +118,8 @@ pub fn run_seeds(
     if interrupted {
         return Err(Error::Interrupted);
     }
-    summaries.sort_by_key(|s| s.seed);
-    Ok(summaries)
+    summaries.sort_by_key(|(index, _)| *index);
+    Ok(summaries.into_iter().map(|(_, summary)| summary).collect())
 }
 
 /// A batch in numbers.

@@ -94,7 +94,8 @@ fn scan(pyramid: &Pyramid, layer: usize, criteria: &Criteria, scratch: &mut Scra
     // The finest layer has none below it: what is smallest there may be smaller still, and is taken as it is.
     let finer = (layer > 0).then(|| Neighbour::new(pyramid, layer - 1, layer));
     // One of the two lies in the same octave. It is asked first, since it needs no interpolation.
-    let (first, last) = if layer % 2 == 0 { (Some(&coarser), finer.as_ref()) } else { (finer.as_ref(), Some(&coarser)) };
+    let (first, last) =
+        if layer.is_multiple_of(2) { (Some(&coarser), finer.as_ref()) } else { (finer.as_ref(), Some(&coarser)) };
     for y in 1..height - 1 {
         let rows = [image.row(y - 1), image.row(y), image.row(y + 1)];
         scratch.find(rows, criteria.contrast);

@@ -3,14 +3,16 @@
 //! A sensor belongs to the simulator, so it sees the true poses; what it gives to the method are bearings only. Three kinds:
 //! [`RenderedSensor`] looks through the camera and the feature extractor, [`IdealSensor`] takes the bearings of the landmark
 //! bodies from geometry, and [`NoisySensor`] spoils those with noise, drop-outs and false matches. A [`DegradedSensor`] makes any
-//! of them worse, for studies of robustness.
+//! of them worse, for studies of robustness; a [`CompassSensor`] adds a compass to any of them.
 
+mod compass;
 mod degraded;
 mod ideal;
 mod noisy;
 mod rendered;
 mod sight;
 
+pub use compass::CompassSensor;
 pub use degraded::{Degradation, DegradedSensor};
 pub use ideal::IdealSensor;
 pub use noisy::{Noise, NoisySensor};
@@ -33,6 +35,11 @@ pub trait Sensor {
     /// # Errors
     /// When a renderer fails.
     fn observe(&mut self, truth: Pose, bodies: &[Pose]) -> Result<Vec<Bearing>>;
+
+    /// Heading in the home frame, rad, of a robot whose true pose in the room is `truth`; `None` without a compass.
+    fn compass_rad(&mut self, _truth: Pose) -> Option<f64> {
+        None
+    }
 
     /// The panorama from home, where the sensor has a camera.
     fn home_panorama(&self) -> Option<&Panorama> {

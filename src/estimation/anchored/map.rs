@@ -9,11 +9,12 @@
 
 use std::collections::BTreeMap;
 
-use nalgebra::{DMatrix, DVector, Matrix2, Matrix3};
+use nalgebra::{DMatrix, DVector, Matrix2, Matrix3, Vector3};
 
 use super::FilterSettings;
 use super::motion::Motion;
 use crate::estimation::gaussian::{Gaussian, Linearised, SparseRow};
+use crate::estimation::resection;
 use crate::geometry::{Pose, atan2, direction, sin_cos, wrap};
 use crate::observation::{Bearing, Estimate, LandmarkId};
 
@@ -23,6 +24,8 @@ const LANDMARKS: usize = 3;
 const BAN_STEPS: u64 = 25;
 /// A landmark unseen for this many steps makes way when another wants its place.
 const STALE_STEPS: u64 = 10;
+/// Refused bearings that contradict a belief if they are also more than twice those that fit.
+const LEAST_CONTRADICTION: usize = 4;
 /// Strikes after which a landmark is dropped; a bearing that fits takes one back.
 const STRIKES: u32 = 3;
 /// Inverse ranges outside of this are no landmark's, 1/m: nearer than 5 cm, or clearly beyond infinity.
@@ -57,6 +60,8 @@ pub struct Update {
     pub strangers: Vec<Bearing>,
     /// Normalised innovation squared of the used bearings, all together.
     pub nis: f64,
+    /// Whether most bearings were refused: nothing was updated then, and no landmark is to blame.
+    pub contradicted: bool,
 }
 
 /// Pose and landmarks in one anchor frame.
@@ -154,19 +159,90 @@ impl Map {
         let after = before.compose(&motion.delta);
         let moved = after.position() - before.position();
         let f = Matrix3::new(1.0, 0.0, -moved.y, 0.0, 1.0, moved.x, 0.0, 0.0, 1.0);
-        let (s, c) = sin_cos(before.heading);
-        let turn = Matrix3::new(c, -s, 0.0, s, c, 0.0, 0.0, 0.0, 1.0);
-        self.belief.propagate_pose(&f, &(turn * motion.covariance * turn.transpose()));
-        self.belief.mean[0] = after.x;
-        self.belief.mean[1] = after.y;
-        self.belief.mean[2] = after.heading;
+        self.belief.propagate_pose(&f, &in_map_frame(&before, &motion.covariance));
+        self.set_pose(&after);
+    }
+
+    /// Adds to the noise of the step that was just predicted; `before` is the pose before it, and `more` is in that pose's frame.
+    pub fn loosen(&mut self, before: &Pose, more: &Matrix3<f64>) {
+        self.belief.propagate_pose(&Matrix3::identity(), &in_map_frame(before, more));
+    }
+
+    /// Puts the robot somewhere else: what was known of its pose is forgotten, what is known of the landmarks stays.
+    pub fn relocate(&mut self, pose: &Pose, sd_m: f64, sd_rad: f64) {
+        self.belief.reset(0, &[pose.x, pose.y, pose.heading], &[sd_m * sd_m, sd_m * sd_m, sd_rad * sd_rad]);
+    }
+
+    fn set_pose(&mut self, pose: &Pose) {
+        self.belief.mean[0] = pose.x;
+        self.belief.mean[1] = pose.y;
+        self.belief.mean[2] = pose.heading;
+    }
+
+    /// How many of the bearings are of landmarks that the map holds, and how many of these would pass the gate if the step
+    /// just predicted had each of the given noises on top of its own (covariances in the frame of `before`).
+    #[must_use]
+    pub fn count_fits<const N: usize>(
+        &self,
+        bearings: &[Bearing],
+        before: &Pose,
+        more: &[Matrix3<f64>; N],
+        gate: f64,
+    ) -> (usize, [usize; N]) {
+        let more = more.map(|m| in_map_frame(before, &m));
+        let index = self.index();
+        let (mut held, mut fits) = (0, [0; N]);
+        for bearing in bearings {
+            let Some(&k) = index.get(&bearing.id) else { continue };
+            held += 1;
+            let m = linearise(&self.belief.mean, k, bearing);
+            let by_pose = Vector3::from_fn(|i, _| m.row.entries()[i].1);
+            let squared = m.innovation * m.innovation;
+            let variance = self.belief.variance_along(&m.row) + m.variance;
+            for (fits, more) in fits.iter_mut().zip(&more) {
+                *fits += usize::from(squared <= gate * (variance + (more * by_pose).dot(&by_pose)));
+            }
+        }
+        (held, fits)
+    }
+
+    /// What resection of the robot needs: the landmarks among the bearings with what the map knows of them.
+    #[must_use]
+    pub fn sightings(&self, bearings: &[Bearing]) -> Vec<resection::Sighting> {
+        let index = self.index();
+        bearings
+            .iter()
+            .filter_map(|bearing| {
+                let (mean, covariance) = self.landmark(*index.get(&bearing.id)?);
+                Some(resection::Sighting {
+                    direction_rad: mean[0],
+                    inverse_range: mean[1],
+                    covariance,
+                    bearing_rad: bearing.azimuth_rad,
+                    variance: bearing.sd_rad * bearing.sd_rad,
+                })
+            })
+            .collect()
+    }
+
+    fn index(&self) -> BTreeMap<LandmarkId, usize> {
+        self.landmarks.iter().enumerate().map(|(k, l)| (l.id, k)).collect()
     }
 
     /// Measurement update with the landmarks that the map holds; gates each bearing, iterates, drops landmarks that keep failing.
-    pub fn update(&mut self, bearings: &[Bearing], settings: &FilterSettings, iterations: usize) -> Update {
+    /// Where the step before was loosened the gate lets much through, and is held against the updated belief once more. A
+    /// `settled` map that most bearings contradict is left as it is; one that is still being built may owe it to its landmarks.
+    pub fn update(
+        &mut self,
+        bearings: &[Bearing],
+        settings: &FilterSettings,
+        iterations: usize,
+        loosened: bool,
+        settled: bool,
+    ) -> Update {
         self.step += 1;
         let mut update = Update::default();
-        let index: BTreeMap<LandmarkId, usize> = self.landmarks.iter().enumerate().map(|(k, l)| (l.id, k)).collect();
+        let index = self.index();
         let mut members = Vec::new();
         for bearing in bearings {
             if !(bearing.azimuth_rad.is_finite() && bearing.sd_rad.is_finite()) {
@@ -181,14 +257,32 @@ impl Map {
                 }
                 continue;
             };
-            if self.fits(k, bearing, settings.gate) {
-                members.push((k, *bearing));
-                update.used.push(*bearing);
-                self.landmarks[k].last_seen = self.step;
-                self.landmarks[k].strikes = self.landmarks[k].strikes.saturating_sub(1);
+            members.push((k, *bearing));
+        }
+        let held = members.clone();
+        members.retain(|(k, bearing)| self.fits(*k, bearing, settings.gate));
+        if loosened && !members.is_empty() {
+            let prior = self.belief.clone();
+            self.belief.update_iterated(iterations, |x| members.iter().map(|(k, b)| linearise(x, *k, b)).collect());
+            members.retain(|(k, bearing)| self.fits(*k, bearing, settings.gate));
+            self.belief = prior;
+        }
+        let refused = held.len() - members.len() + update.banned;
+        if settled && refused >= LEAST_CONTRADICTION && refused > 2 * members.len() {
+            update.contradicted = true;
+            update.rejected += held.len();
+            return update;
+        }
+        let mut used = members.iter().peekable();
+        for (k, bearing) in held {
+            let landmark = &mut self.landmarks[k];
+            if used.next_if(|m| m.1 == bearing).is_some() {
+                update.used.push(bearing);
+                landmark.last_seen = self.step;
+                landmark.strikes = landmark.strikes.saturating_sub(1);
             } else {
                 update.rejected += 1;
-                self.landmarks[k].strikes += 1;
+                landmark.strikes += 1;
             }
         }
         match self.belief.update_iterated(iterations, |x| members.iter().map(|(k, b)| linearise(x, *k, b)).collect()) {
@@ -276,6 +370,13 @@ impl Map {
         }
         Some(settings.prior(from_anchor, inverse_range))
     }
+}
+
+/// A pose covariance given in the frame of `pose`, in the frame that `pose` itself is given in.
+fn in_map_frame(pose: &Pose, covariance: &Matrix3<f64>) -> Matrix3<f64> {
+    let (s, c) = sin_cos(pose.heading);
+    let turn = Matrix3::new(c, -s, 0.0, s, c, 0.0, 0.0, 0.0, 1.0);
+    turn * covariance * turn.transpose()
 }
 
 fn linearise(x: &DVector<f64>, k: usize, bearing: &Bearing) -> Linearised {

@@ -10,7 +10,9 @@
 //!    [`smoother`] does it from everything stored so far, and does it again a few times, ever more seldom, so that no
 //!    linearisation from the time when ranges were unknown survives.
 //!
-//! A filter that no longer explains what it sees (a kick, a kidnap, a wrong hypothesis) restarts at stage 1 where it stands.
+//! A step that the wheels do not explain is given more noise until the bearings fit ([`motion`]). Where no noise of the wheels'
+//! does it (a kick, a kidnap, a wrong hypothesis) the filter is lost: it looks for the robot on its map, by resection again, and
+//! where that fails it gives its belief up and searches anew from where it stands.
 
 pub mod map;
 pub mod motion;
@@ -20,11 +22,11 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use super::resection::{self, position_sd_m, resect};
-use crate::geometry::{Pose, Vector2, angle_of, direction, wrap};
+use super::resection::{self, Hypothesis, position_sd_m, resect};
+use crate::geometry::{Matrix3, Pose, Vector2, angle_of, direction, wrap};
 use crate::observation::{Bearing, Estimate, HomeSnapshot, LandmarkId, Odometry};
 use map::{Map, Prior, Update};
-use motion::Motion;
+use motion::{LOOSENINGS, Motion, SlipWatch};
 use smoother::{Frame, Iterate, Sighting, Solution, Stretch};
 
 /// Knobs of the filter.
@@ -45,6 +47,14 @@ pub struct FilterSettings {
     pub turn_noise_rad_m: f64,
     /// Sideways motion of the axle as a share of speed (scrub).
     pub sideways_noise_share: f64,
+    /// Distance between the wheels, m.
+    pub track_m: f64,
+    /// Slip of a wheel as a share of the change of its speed over a step.
+    pub slip_share: f64,
+    /// Share of a step's slip that is still expected in the next one.
+    pub slip_persistence: f64,
+    /// Sideways slip of the axle as a share of the wheels' slip.
+    pub sideways_slip_share: f64,
     /// A bearing whose normalised innovation squared exceeds this is refused (chi-square, one degree of freedom; 10.8 is 0.1 %).
     pub gate: f64,
     /// Landmarks in the state at most.
@@ -71,6 +81,10 @@ impl Default for FilterSettings {
             turn_noise_share: 0.04,
             turn_noise_rad_m: 0.03,
             sideways_noise_share: 0.01,
+            track_m: 0.25,
+            slip_share: 0.3,
+            slip_persistence: 0.6,
+            sideways_slip_share: 0.3,
             gate: 10.8,
             max_landmarks: 60,
             adopt_sd_share: 0.06,
@@ -115,6 +129,21 @@ const SMOOTHER_ROUNDS: usize = 4;
 /// Greatest mean squared normalised residual of a solution that is believed.
 const GREATEST_MEAN_SQUARE: f64 = 2.5;
 
+/// How well a robot that was carried off must be found on the map, m; else the search begins anew.
+const RELOCATION_SD_M: f64 = 0.15;
+/// A step whose squared Mahalanobis distance from odometry exceeds this slipped (chi-square, three degrees of freedom; 0.1 %).
+const SLIP_GATE: f64 = 16.3;
+
+/// How the robot came here from the step before.
+#[derive(Debug, Clone, Copy)]
+struct Moved {
+    /// Where it was believed to be then.
+    before: Pose,
+    motion: Motion,
+    /// Whether the bearings asked for more noise than the motion had.
+    loosened: bool,
+}
+
 /// One stored step: motion since the step before, bearings that were used, pose in the anchor frame.
 #[derive(Debug, Clone)]
 struct Stored {
@@ -139,6 +168,9 @@ pub struct AnchoredFilter {
     stage: Stage,
     map: Map,
     history: Vec<Stored>,
+    slip: SlipWatch,
+    /// Where home may be, in the first anchor's frame, likeliest first; empty once home is found.
+    hypotheses: Vec<Hypothesis>,
     bad_steps: u32,
     restarts: u32,
 }
@@ -153,6 +185,8 @@ impl AnchoredFilter {
             stage: Stage::Search { guess: None },
             map: Map::at_anchor(),
             history: Vec::new(),
+            slip: SlipWatch::default(),
+            hypotheses: Vec::new(),
             bad_steps: 0,
             restarts: 0,
         }
@@ -163,8 +197,16 @@ impl AnchoredFilter {
         self.stage = Stage::Search { guess: None };
         self.map = Map::at_anchor();
         self.history.clear();
+        self.hypotheses.clear();
         self.bad_steps = 0;
         self.restarts += 1;
+    }
+
+    /// Where home may be, in the frame of the first pose, likeliest first; empty once home is found. One of them is adopted when
+    /// it is sharp and the others explain the snapshot worse by a margin.
+    #[must_use]
+    pub fn hypotheses(&self) -> &[Hypothesis] {
+        &self.hypotheses
     }
 
     /// How often the filter gave its belief up.
@@ -173,10 +215,11 @@ impl AnchoredFilter {
         self.restarts
     }
 
-    /// The robot's pose in the home frame with its covariance, once home is found.
+    /// The robot's pose in the home frame with its covariance, once home is found. There is none while what is seen contradicts
+    /// the belief for more than a step: the filter is lost then, until it finds itself on its map or home anew.
     #[must_use]
     pub fn estimate(&self) -> Option<Estimate> {
-        matches!(self.stage, Stage::Homing { .. }).then(|| self.map.estimate())
+        (matches!(self.stage, Stage::Homing { .. }) && self.bad_steps <= 1).then(|| self.map.estimate())
     }
 
     /// The robot's pose in the home frame by the best hypothesis; no covariance is claimed.
@@ -188,31 +231,60 @@ impl AnchoredFilter {
         }
     }
 
+    /// The robot's pose on the map, whatever that is anchored at: the first pose while home is searched for, then home.
+    #[must_use]
+    pub fn map_pose(&self) -> Pose {
+        self.map.pose()
+    }
+
     /// Time update and measurement update.
     pub fn step(&mut self, odometry: &Odometry, bearings: &[Bearing]) -> StepReport {
-        let motion = Motion::from_odometry(odometry, &self.settings);
+        let slip_m_s = self.slip.expect(odometry, &self.settings);
+        let motion = Motion::from_odometry(odometry, slip_m_s, &self.settings);
+        let before = self.map.pose();
+        let mut moved = Moved { before, motion, loosened: false };
         if odometry.dt_s > 0.0 {
-            self.map.predict(&motion);
+            self.map.predict(&moved.motion);
+            if let Some(more) = self.contradiction(&before, &moved.motion, odometry.dt_s, bearings) {
+                self.map.loosen(&before, &more);
+                moved.motion.covariance += more;
+                moved.loosened = true;
+            }
         }
         match self.stage {
-            Stage::Search { .. } => self.search(motion, bearings),
-            Stage::Homing { .. } => self.track(motion, bearings),
+            Stage::Search { .. } => self.search(moved, bearings),
+            Stage::Homing { .. } => self.track(moved, bearings),
         }
     }
 
-    fn search(&mut self, motion: Motion, bearings: &[Bearing]) -> StepReport {
-        let mut report = self.search_update(motion, bearings);
+    /// Noise that the step needs on top of its own for the bearings to fit: the first of [`LOOSENINGS`] that does about as well
+    /// as the best of them. `None` where most bearings fit anyway, or none of them makes most fit.
+    fn contradiction(&self, before: &Pose, motion: &Motion, dt_s: f64, bearings: &[Bearing]) -> Option<Matrix3<f64>> {
+        let [a, b, c] = LOOSENINGS.map(|by| motion.loosened(by, dt_s, &self.settings));
+        let tried = [Matrix3::zeros(), a, b, c];
+        let (held, fits) = self.map.count_fits(bearings, before, &tried, self.settings.gate);
+        let best = fits.into_iter().max()?;
+        let mostly = |fits: usize| 4 * fits >= 3 * held;
+        if 2 * fits[0] >= held || !mostly(best) || best < fits[0] + 3.max(held / 5) {
+            return None;
+        }
+        let rung = fits.iter().position(|&fits| 10 * fits >= 9 * best)?;
+        Some(tried[rung])
+    }
+
+    fn search(&mut self, moved: Moved, bearings: &[Bearing]) -> StepReport {
+        let mut report = self.search_update(moved, bearings);
         if self.map.seen_now() < 3 && bearings.len() >= 6 {
             // The landmarks that the anchor held on to are gone; begin again with those in view.
             self.restart();
-            report = self.search_update(motion, bearings);
+            report = self.search_update(moved, bearings);
         }
         self.seek_home();
         report
     }
 
-    fn search_update(&mut self, motion: Motion, bearings: &[Bearing]) -> StepReport {
-        let mut update = self.map.update(bearings, &self.settings, 3);
+    fn search_update(&mut self, moved: Moved, bearings: &[Bearing]) -> StepReport {
+        let mut update = self.map.update(bearings, &self.settings, 3, moved.loosened, false);
         let pose = self.map.pose();
         if pose.position().norm() <= FIRST_ANCHOR_REACH_M {
             let room = self.map.make_room(update.strangers.len(), self.settings.max_landmarks);
@@ -229,7 +301,7 @@ impl AnchoredFilter {
                 self.add(&prior, &bearing, &mut update);
             }
         }
-        self.store(motion, &update);
+        self.store(moved.motion, &update);
         StepReport { matched: update.used.len(), rejected: update.rejected, nis: update.nis }
     }
 
@@ -247,31 +319,23 @@ impl AnchoredFilter {
         }
     }
 
-    fn track(&mut self, motion: Motion, bearings: &[Bearing]) -> StepReport {
-        let mut update = self.map.update(bearings, &self.settings, 2);
-        let nis = update.nis;
-        let updated = update.used.len();
-        let room = self.map.make_room(update.strangers.len(), self.settings.max_landmarks);
-        for bearing in spread_over_azimuth(&update.strangers, room) {
-            let Some(home) = self.home.get(&bearing.id) else { continue };
-            match self.map.triangulated_prior(home, &bearing, &self.settings) {
-                Some(prior) => self.add(&prior, &bearing, &mut update),
-                None => {
-                    update.rejected += 1;
-                    self.map.ban(bearing.id, 3);
-                }
-            }
+    fn track(&mut self, mut moved: Moved, bearings: &[Bearing]) -> StepReport {
+        let mut update = self.map.update(bearings, &self.settings, 2, moved.loosened, true);
+        if update.contradicted && self.bad_steps > 0 && self.relocate(bearings) {
+            let delta = moved.before.to_local(&self.map.pose());
+            moved.motion = Motion { delta, covariance: Matrix3::identity() };
+            update = self.map.update(bearings, &self.settings, 3, true, true);
         }
-        self.store(motion, &update);
-        let report = StepReport { matched: updated, rejected: update.rejected, nis };
-        // Landmarks just added fit by construction; only those that were predicted testify for the belief.
-        let against = update.rejected + update.banned;
-        let bad = against >= 4 && against > updated;
-        self.bad_steps = if bad { self.bad_steps + 1 } else { 0 };
+        self.bad_steps = if update.contradicted { self.bad_steps + 1 } else { 0 };
         if self.bad_steps > self.settings.patience_steps {
             self.restart();
-            return self.search(motion, bearings);
+            return self.search(moved, bearings);
         }
+        let updated = update.used.len();
+        if !update.contradicted {
+            self.adopt_strangers(&mut update);
+        }
+        self.store(moved.motion, &update);
         if let Stage::Homing { next_rebuild, interval } = self.stage
             && self.history.len() >= next_rebuild
             && next_rebuild <= self.settings.history_steps
@@ -280,7 +344,39 @@ impl AnchoredFilter {
             let interval = interval + interval.div_ceil(2);
             self.stage = Stage::Homing { next_rebuild: self.history.len() + interval, interval };
         }
-        report
+        StepReport { matched: updated, rejected: update.rejected, nis: update.nis }
+    }
+
+    /// Adds landmarks of the snapshot that are seen and not yet in the map.
+    fn adopt_strangers(&mut self, update: &mut Update) {
+        let room = self.map.make_room(update.strangers.len(), self.settings.max_landmarks);
+        for bearing in spread_over_azimuth(&update.strangers, room) {
+            let Some(home) = self.home.get(&bearing.id) else { continue };
+            match self.map.triangulated_prior(home, &bearing, &self.settings) {
+                Some(prior) => self.add(&prior, &bearing, update),
+                None => {
+                    update.rejected += 1;
+                    self.map.ban(bearing.id, 3);
+                }
+            }
+        }
+    }
+
+    /// Looks for the robot on the map by what it sees now, wherever it was believed to be.
+    fn relocate(&mut self, bearings: &[Bearing]) -> bool {
+        let sightings = self.map.sightings(bearings);
+        let pose = self.map.pose();
+        let found = resect(&sightings, pose.position(), Some(pose));
+        let Some(best) = found.first() else { return false };
+        let unrivalled = found.get(1).is_none_or(|second| second.cost - best.cost > self.settings.adopt_margin);
+        let inliers: Vec<_> =
+            sightings.iter().filter(|s| s.normalised_squared(&best.pose) <= self.settings.gate).copied().collect();
+        let enough = inliers.len() >= 5 && 10 * inliers.len() >= 6 * sightings.len();
+        if !unrivalled || !enough || position_sd_m(&inliers, &best.pose) > RELOCATION_SD_M {
+            return false;
+        }
+        self.map.relocate(&best.pose, 1.0, 1.0);
+        true
     }
 
     /// Looks for home; moves on to the second stage once the answer is sharp and without rival.
@@ -296,7 +392,7 @@ impl AnchoredFilter {
                     direction_rad: mean[0],
                     inverse_range: mean[1],
                     covariance,
-                    home_bearing_rad: home.azimuth_rad,
+                    bearing_rad: home.azimuth_rad,
                     variance: home.sd_rad * home.sd_rad,
                 };
                 Some((id, sighting))
@@ -305,27 +401,27 @@ impl AnchoredFilter {
         let sightings: Vec<_> = members.iter().map(|m| m.1).collect();
         let Stage::Search { guess } = self.stage else { return };
         let robot = self.map.pose().position();
-        let found = resect(&sightings, robot, guess);
-        let Some(best) = found.first().copied() else { return };
-        self.stage = Stage::Search { guess: Some(best.home) };
-        let unrivalled = found.get(1).is_none_or(|second| second.cost - best.cost > self.settings.adopt_margin);
+        self.hypotheses = resect(&sightings, robot, guess);
+        let Some(best) = self.hypotheses.first().copied() else { return };
+        self.stage = Stage::Search { guess: Some(best.pose) };
+        let unrivalled = self.hypotheses.get(1).is_none_or(|second| second.cost - best.cost > self.settings.adopt_margin);
         let inliers: Vec<_> =
-            members.iter().filter(|m| m.1.normalised_squared(&best.home) <= self.settings.gate).copied().collect();
+            members.iter().filter(|m| m.1.normalised_squared(&best.pose) <= self.settings.gate).copied().collect();
         if !unrivalled || inliers.len() < 3 || 3 * inliers.len() < 2 * members.len() {
             return;
         }
-        let sharp_sd = self.sharp_sd((best.home.position() - robot).norm());
+        let sharp_sd = self.sharp_sd((best.pose.position() - robot).norm());
         let inlier_sightings: Vec<_> = inliers.iter().map(|m| m.1).collect();
-        if position_sd_m(&inlier_sightings, &best.home) > sharp_sd {
+        if position_sd_m(&inlier_sightings, &best.pose) > sharp_sd {
             return;
         }
         let ids: Vec<_> = inliers.iter().map(|m| m.0).collect();
         let start = Iterate {
-            poses: self.history.iter().map(|s| best.home.to_local(&s.pose)).collect(),
-            landmarks: inliers.iter().map(|m| from_home(&m.1, &best.home)).collect(),
+            poses: self.history.iter().map(|s| best.pose.to_local(&s.pose)).collect(),
+            landmarks: inliers.iter().map(|m| from_home(&m.1, &best.pose)).collect(),
         };
-        let supposed = best.home.to_local(&self.map.pose()).position();
-        let Some((ids, solution)) = self.smooth(ids, start) else { return };
+        let supposed = best.pose.to_local(&self.map.pose()).position();
+        let Some((ids, solution, motions)) = self.smooth(ids, start) else { return };
         let sharp = |e: &Estimate| e.position_sd_m() <= self.sharp_sd(e.range_m());
         let candidate = Map::from_solution(&ids, solution.mean.clone(), solution.covariance.clone());
         let estimate = candidate.estimate();
@@ -333,8 +429,9 @@ impl AnchoredFilter {
             return;
         }
         self.map = candidate;
-        self.keep_poses(&solution);
+        self.keep(&solution, motions);
         self.bad_steps = 0;
+        self.hypotheses.clear();
         self.stage = Stage::Homing { next_rebuild: self.history.len() + 1, interval: 1 };
     }
 
@@ -343,9 +440,10 @@ impl AnchoredFilter {
         (self.settings.adopt_sd_share * range_m).max(self.settings.adopt_sd_m)
     }
 
-    fn keep_poses(&mut self, solution: &Solution) {
-        for (stored, pose) in self.history.iter_mut().zip(&solution.at.poses) {
+    fn keep(&mut self, solution: &Solution, motions: Vec<Motion>) {
+        for ((stored, pose), motion) in self.history.iter_mut().zip(&solution.at.poses).zip(motions) {
             stored.pose = *pose;
+            stored.motion = motion;
         }
     }
 
@@ -357,19 +455,20 @@ impl AnchoredFilter {
             poses: self.history.iter().map(|s| s.pose).collect(),
             landmarks: (0..ids.len()).map(|k| self.map.landmark(k).0).collect(),
         };
-        if let Some((kept, solution)) = self.smooth(ids, start)
+        if let Some((kept, solution, motions)) = self.smooth(ids, start)
             && kept.len() >= 3
             && 2 * kept.len() > held
         {
             self.map.replace(&kept, solution.mean.clone(), solution.covariance.clone());
-            self.keep_poses(&solution);
+            self.keep(&solution, motions);
         }
     }
 
-    /// Smooths the history with the given landmarks, drops bearings and landmarks that do not fit, and smooths again. `None`
-    /// where no believable solution comes out.
-    fn smooth(&self, mut ids: Vec<LandmarkId>, mut start: Iterate) -> Option<(Vec<LandmarkId>, Solution)> {
+    /// Smooths the history with the given landmarks, drops bearings and landmarks that do not fit, loosens steps in which the
+    /// wheels must have slipped, and smooths again. `None` where no believable solution comes out.
+    fn smooth(&self, mut ids: Vec<LandmarkId>, mut start: Iterate) -> Option<(Vec<LandmarkId>, Solution, Vec<Motion>)> {
         let gate = self.settings.gate;
+        let mut motions: Vec<Motion> = self.history.iter().map(|stored| stored.motion).collect();
         let mut refused: Vec<(usize, LandmarkId)> = Vec::new();
         for round in 1..=SMOOTHER_ROUNDS {
             let index: BTreeMap<LandmarkId, usize> = ids.iter().enumerate().map(|(k, id)| (*id, k)).collect();
@@ -388,7 +487,7 @@ impl AnchoredFilter {
                 .iter()
                 .enumerate()
                 .map(|(f, stored)| Frame {
-                    motion: stored.motion,
+                    motion: motions[f],
                     sightings: stored
                         .bearings
                         .iter()
@@ -402,9 +501,17 @@ impl AnchoredFilter {
                 .collect();
             // Wrong matches are told apart first, then what is left is taken at its word.
             let heavy_tails = round == 1;
-            let solution = Stretch { frames: &frames, priors: &priors, heavy_tails }.solve(start)?;
+            let stretch = Stretch { frames: &frames, priors: &priors, heavy_tails };
+            let solution = stretch.solve(start)?;
             let mut seen = vec![(0_usize, 0_usize); ids.len()];
             let mut clean = true;
+            for (f, motion) in motions.iter_mut().enumerate().skip(1) {
+                let squared = stretch.motion_squared(&solution.at, f);
+                if !heavy_tails && squared > SLIP_GATE {
+                    motion.covariance *= squared / 3.0;
+                    clean = false;
+                }
+            }
             for (f, frame) in frames.iter().enumerate() {
                 for s in &frame.sightings {
                     seen[s.landmark].0 += 1;
@@ -423,7 +530,7 @@ impl AnchoredFilter {
             let kept: Vec<usize> = (0..ids.len()).filter(|&k| keeps(k)).collect();
             if !heavy_tails && (clean || round == SMOOTHER_ROUNDS) && kept.len() == ids.len() {
                 let (sum, count) = solution.chi_square;
-                return (sum <= GREATEST_MEAN_SQUARE * count as f64).then_some((ids, solution));
+                return (sum <= GREATEST_MEAN_SQUARE * count as f64).then_some((ids, solution, motions));
             }
             start = Iterate {
                 poses: solution.at.poses.clone(),

@@ -135,6 +135,14 @@ impl Stretch<'_> {
         r * r / s.variance
     }
 
+    /// Squared Mahalanobis distance between how the robot came to a frame, the first excepted, and what odometry tells.
+    #[must_use]
+    pub fn motion_squared(&self, at: &Iterate, frame: usize) -> f64 {
+        let motion = &self.frames[frame].motion;
+        let e = motion_error(&at.poses[frame - 1], &at.poses[frame], motion);
+        motion.covariance.try_inverse().map_or(f64::INFINITY, |w| (w * e).dot(&e))
+    }
+
     /// Contribution of a squared normalised residual to the cost, and its weight in the normal equations.
     fn loss(&self, squared: f64) -> (f64, f64) {
         if self.heavy_tails {
@@ -167,8 +175,7 @@ impl Stretch<'_> {
             sum += d * d / prior.variance[0] + r * r / prior.variance[1];
         }
         for k in 1..self.frames.len() {
-            let e = motion_error(&at.poses[k - 1], &at.poses[k], &self.frames[k].motion);
-            sum += self.frames[k].motion.covariance.try_inverse().map_or(f64::INFINITY, |w| (w * e).dot(&e));
+            sum += self.motion_squared(at, k);
         }
         if sum.is_finite() { sum } else { f64::INFINITY }
     }
@@ -209,9 +216,9 @@ impl Stretch<'_> {
                 }
             }
             let Some(next) = self.frames.get(k + 1) else { break };
-            let weight = next.motion.covariance.try_inverse()?;
             let (before, after) = (&at.poses[k], &at.poses[k + 1]);
             let e = motion_error(before, after, &next.motion);
+            let weight = next.motion.covariance.try_inverse()?;
             let (jb, ja) = motion_jacobians(before, after);
             let inverse = (pp + jb.transpose() * weight * jb).try_inverse()?;
             let right = p_right - jb.transpose() * weight * e;
@@ -304,4 +311,33 @@ fn motion_jacobians(before: &Pose, after: &Pose) -> (Matrix3<f64>, Matrix3<f64>)
     let by_before = Matrix3::new(-c, -s, went.y, s, -c, -went.x, 0.0, 0.0, -1.0);
     let by_after = Matrix3::new(c, s, 0.0, -s, c, 0.0, 0.0, 0.0, 1.0);
     (by_before, by_after)
+}
+
+#[cfg(test)]
+mod tests {
+    use num_dual::{Dual64, DualNum};
+
+    use super::*;
+
+    /// The analytic derivatives of the motion error against automatic differentiation of its closed form.
+    #[test]
+    fn motion_derivatives_equal_automatic_ones() {
+        for k in 0..50 {
+            let t = f64::from(k);
+            let before = Pose::new(libm::sin(t), 2.0 * libm::cos(0.7 * t), 0.3 * t);
+            let after = Pose::new(before.x + 0.1 * libm::cos(1.1 * t), before.y + 0.05, before.heading - 0.4);
+            let x = [before.x, before.y, before.heading, after.x, after.y, after.heading];
+            let (by_before, by_after) = motion_jacobians(&before, &after);
+            for column in 0..6 {
+                let d: [Dual64; 6] = std::array::from_fn(|i| Dual64::new(x[i], if i == column { 1.0 } else { 0.0 }));
+                let (dx, dy) = (d[3] - d[0], d[4] - d[1]);
+                let (s, c) = (d[2].sin(), d[2].cos());
+                let error = [c * dx + s * dy, c * dy - s * dx, d[5] - d[2]];
+                for (row, exact) in error.iter().enumerate() {
+                    let analytic = if column < 3 { by_before[(row, column)] } else { by_after[(row, column - 3)] };
+                    assert!((exact.eps - analytic).abs() < 1e-12, "{k} {row} {column}: {} {analytic}", exact.eps);
+                }
+            }
+        }
+    }
 }

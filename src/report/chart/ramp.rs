@@ -27,7 +27,7 @@ const COLOURS: [[f64; 3]; 6] = [
 
 impl Ramp {
     /// Colour of a value, and that of a text on it.
-    pub(super) fn colour(&self, value: f64) -> (String, &'static str) {
+    pub(in crate::report) fn colour(&self, value: f64) -> (String, &'static str) {
         let share = ((value - self.low) / (self.high - self.low)).clamp(0.0, 1.0);
         let place = share * (COLOURS.len() - 1) as f64;
         let before = (place as usize).min(COLOURS.len() - 2); // NaN becomes 0

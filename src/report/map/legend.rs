@@ -5,6 +5,7 @@ use svg::node::element::Group;
 use super::PathStyle;
 use super::paint::{self, BodyPaint, INK, STARTS, circle, polyline, px, rectangle, text};
 use crate::geometry::Vector2;
+use crate::report::chart::Ramp;
 
 /// The picture in front of an entry's text.
 #[derive(Debug, Clone, PartialEq)]
@@ -18,6 +19,9 @@ pub(super) enum Swatch {
     Robot(&'static str),
     Path(PathStyle),
     Ellipse,
+    Field(Ramp),
+    Arrow,
+    Spot(&'static str),
 }
 
 /// What the map explains.
@@ -74,7 +78,7 @@ impl Swatch {
     fn rank(&self) -> u8 {
         match self {
             Self::Path(_) => 0,
-            Self::Ellipse => 1,
+            Self::Ellipse | Self::Field(_) | Self::Arrow | Self::Spot(_) => 1,
             Self::Robot(_) => 2,
             Self::Home => 3,
             Self::NamedStart => 4,
@@ -114,6 +118,12 @@ impl Swatch {
                     .set("stroke-dasharray", if style.dashes.is_empty() { "none" } else { style.dashes }),
             ),
             Self::Ellipse => group.add(paint::ellipse(middle, [11.0, 5.5], 0.0)),
+            Self::Field(ramp) => (0..6).fold(group, |group, k| {
+                let colour = ramp.colour(ramp.low + f64::from(k) / 5.0 * (ramp.high - ramp.low)).0;
+                group.add(rectangle(x + 1.0 + 4.0 * f64::from(k), y - 6.0, 4.3, 12.0).set("fill", colour))
+            }),
+            Self::Arrow => group.add(paint::arrow(left, 26.0, 0.0, INK, 1.2)),
+            Self::Spot(colour) => group.add(circle(middle, 5.0).set("fill", *colour)),
         }
     }
 }

@@ -21,6 +21,7 @@ impl MapDrawing {
     pub(super) fn draw_world(&mut self, world: &World) {
         self.labels.keep_within(self.page(&world.outline));
         self.draw_floor(world);
+        self.floor = std::mem::take(&mut self.scenery);
         self.draw_start_region(world);
         // Ways first, so that bodies stand on them; what hangs last, because it is above.
         for body in &world.bodies {

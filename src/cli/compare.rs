@@ -1,0 +1,123 @@
+//! `wayhome compare`: every method from the same starts.
+
+use std::ops::{ControlFlow, RangeInclusive};
+use std::path::PathBuf;
+
+use anyhow::Result;
+use serde::Serialize;
+use wayhome::episode::{Bearings, PlantKind, Setup};
+use wayhome::render::RendererChoice;
+use wayhome::report::{OutputFolder, compare as report};
+use wayhome::study::compare::{Comparison, compare, pick, runs};
+use wayhome::world::World;
+
+use super::Verdict;
+use super::args::{BEARINGS, PLANTS, RENDERERS, bearings_name, choice, name_of, not_negative, positive, seeds, size};
+use super::context::{Context, default_folder};
+use super::home::needs_bearings;
+
+/// Arguments of `compare`.
+#[derive(Debug, clap::Args)]
+pub struct CompareArgs {
+    /// World file, or the name of a built-in world
+    #[arg(default_value = "lab")]
+    pub world: String,
+    /// What moves
+    #[arg(long, default_value = "rapier", value_parser = choice(PLANTS))]
+    pub plant: PlantKind,
+    /// Where bearings come from
+    #[arg(long, default_value = "noisy", value_parser = choice(BEARINGS))]
+    pub bearings: Bearings,
+    /// Random starts: one a seed from A to B, both included
+    #[arg(long, value_name = "A..B", default_value = "1..20", value_parser = seeds)]
+    pub seeds: RangeInclusive<u64>,
+    /// About how many starts on an even grid there are beside, for AAE and catchment area; 0 for none
+    #[arg(long, value_name = "N", default_value_t = 40, value_parser = clap::value_parser!(u16).range(0..=2000))]
+    pub places: u16,
+    /// Contenders; several are separated by commas [default: all]
+    #[arg(long, value_name = "NAME", value_delimiter = ',')]
+    pub contenders: Vec<String>,
+    /// Standard deviation of the compass of those that have one, degrees
+    #[arg(long, value_name = "DEG", default_value_t = 0.0, allow_negative_numbers = true, value_parser = not_negative)]
+    pub compass_deg: f64,
+    /// What renders
+    #[arg(long, default_value = "auto", value_parser = choice(RENDERERS))]
+    pub renderer: RendererChoice,
+    /// Columns and rows of the panorama, 16x8 to 16384x4096 [default: the world's]
+    #[arg(long, value_name = "WxH", value_parser = size)]
+    pub size: Option<(u32, u32)>,
+    /// Time limit, s [default: the world's]
+    #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = positive)]
+    pub time_limit_s: Option<f64>,
+    /// Folder for the results [default: results/runs/compare-WORLD-SEEDS]
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+}
+
+/// What `--json` prints: the comparison and where the files are.
+#[derive(Serialize)]
+struct Output<'a> {
+    #[serde(flatten)]
+    comparison: &'a Comparison,
+    out: String,
+}
+
+pub fn run(args: &CompareArgs, context: &Context) -> Result<Verdict> {
+    needs_bearings(args.size.is_some(), "--size", args.bearings, Bearings::Rendered)?;
+    let contenders = pick(&args.contenders)?;
+    let world = World::open(&args.world)?;
+    let setup = Setup {
+        plant: args.plant,
+        bearings: args.bearings,
+        renderer: args.renderer,
+        size_px: args.size,
+        compass_sd_rad: Some(args.compass_deg.to_radians()),
+        time_limit_s: args.time_limit_s,
+        ..Setup::default()
+    };
+    let range = format!("{}..{}", args.seeds.start(), args.seeds.end());
+    let out = args.out.clone().unwrap_or_else(|| default_folder(&["compare", &world.spec.name, &range]));
+    let folder = OutputFolder::open(&out, "compare", report::FILES)?;
+    let places = usize::from(args.places);
+    let bar = context.progress(Some(runs(&world, contenders.len(), &args.seeds, places)))?;
+    bar.tick();
+    let comparison = compare(&world, &setup, &contenders, &args.seeds, places, rayon::current_num_threads(), &|contender| {
+        bar.set_message(contender.key);
+        bar.inc(1);
+        if context.is_stopped() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    })?;
+    bar.finish_and_clear();
+    report::write(folder, &world, &comparison, &command(args))?;
+    let output = Output { comparison: &comparison, out: out.display().to_string() };
+    context.print(&output, || format!("{}\nfiles  {}\n", report::table(&comparison), out.display()))?;
+    Ok(Verdict::Done)
+}
+
+/// The command that gives the same files, without what does not matter to them.
+fn command(args: &CompareArgs) -> String {
+    let mut words = vec![format!("wayhome compare {}", args.world)];
+    let mut flag = |name: &str, value: String| words.push(format!("--{name} {value}"));
+    flag("plant", name_of(PLANTS, &args.plant).to_owned());
+    flag("bearings", bearings_name(args.bearings).to_owned());
+    flag("seeds", format!("{}..{}", args.seeds.start(), args.seeds.end()));
+    flag("places", args.places.to_string());
+    if !args.contenders.is_empty() {
+        flag("contenders", args.contenders.join(","));
+    }
+    if args.compass_deg > 0.0 {
+        flag("compass-deg", args.compass_deg.to_string());
+    }
+    if args.bearings == Bearings::Rendered {
+        flag("renderer", name_of(RENDERERS, &args.renderer).to_owned());
+    }
+    if let Some((width, height)) = args.size {
+        flag("size", format!("{width}x{height}"));
+    }
+    if let Some(limit) = args.time_limit_s {
+        flag("time-limit-s", limit.to_string());
+    }
+    if let Some(out) = &args.out {
+        flag("out", out.display().to_string());
+    }
+    words.join(" ")
+}

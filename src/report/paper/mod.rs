@@ -1,0 +1,166 @@
+//! The page on the paper: its tables and figures rebuilt beside the printed numbers, and the audit of its claims.
+//!
+//! Each [`Target`] is a [`Section`] of one page with drawings of its own. A section that is rebuilt alone takes its place in the page
+//! that is there; the others stay.
+
+mod audit;
+mod contest;
+mod observability;
+mod tables;
+
+use std::fs;
+use std::io;
+
+use super::OutputFolder;
+use crate::error::{Error, Result};
+
+pub use audit::{Evidence, audit};
+pub use contest::contest;
+pub use observability::{map_svg, observability, summary as map_summary};
+pub use tables::{fig_five, fig_seven, fig_three, table_one, table_two};
+
+/// What can be reproduced.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Target {
+    /// Table I.
+    Table1,
+    /// Fig. 3.
+    Fig3,
+    /// Table II.
+    Table2,
+    /// Fig. 5.
+    Fig5,
+    /// Fig. 7.
+    Fig7,
+    /// Fig. 8.
+    Fig8,
+    /// The matrix O of (14).
+    Observability,
+    /// All claims.
+    Audit,
+}
+
+impl Target {
+    /// All of them, in the order of the page.
+    pub const ALL: [Self; 8] =
+        [Self::Table1, Self::Fig3, Self::Table2, Self::Fig5, Self::Fig7, Self::Fig8, Self::Observability, Self::Audit];
+
+    /// Its name on the command line.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Table1 => "table1",
+            Self::Fig3 => "fig3",
+            Self::Table2 => "table2",
+            Self::Fig5 => "fig5",
+            Self::Fig7 => "fig7",
+            Self::Fig8 => "fig8",
+            Self::Observability => "observability",
+            Self::Audit => "audit",
+        }
+    }
+}
+
+/// Names of all files of the page.
+pub const FILES: &[&str] = &[
+    "README.md",
+    "fig3-proportional.svg",
+    "fig3-nonlinear.svg",
+    "fig4-objects.png",
+    "fig5-proportional.svg",
+    "fig5-nonlinear.svg",
+    "fig6-objects.png",
+    "fig7-proportional.svg",
+    "fig7-nonlinear.svg",
+    "fig8a.svg",
+    "fig8b.svg",
+    "observability-homeward.svg",
+    "observability-east.svg",
+    "observability-paths.svg",
+    "beta.svg",
+];
+
+/// One part of the page.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Section {
+    /// Which.
+    pub target: Target,
+    /// Its text.
+    pub markdown: String,
+    /// Its drawings by name.
+    pub figures: Vec<(&'static str, Vec<u8>)>,
+}
+
+const TITLE: &str = "# The paper, reproduced and audited
+
+\"Bearing only visual homing: Observer based approach\": its tables and figures rebuilt by this program beside the printed numbers, and \
+what of its claims holds, under which start and which noise. Everything here is written by
+
+```sh
+wayhome reproduce all
+```
+
+and one part of it by `wayhome reproduce NAME`. Two runs give the same bytes. Nothing is tuned to print the paper's numbers.
+";
+
+/// Writes sections with their drawings; those of the page that are not among them stay as they are, unless all are given.
+///
+/// # Errors
+/// When a file cannot be read or written.
+pub fn write(mut folder: OutputFolder, sections: &[Section]) -> Result<()> {
+    let path = folder.path().join("README.md");
+    let before = match fs::read_to_string(&path) {
+        Ok(text) => text,
+        Err(e) if e.kind() == io::ErrorKind::NotFound => String::new(),
+        Err(source) => return Err(Error::Io { action: "read", path, source }),
+    };
+    for (name, bytes) in sections.iter().flat_map(|s| &s.figures) {
+        folder.write(name, bytes)?;
+    }
+    folder.write("README.md", page(&before, sections).as_bytes())?;
+    if Target::ALL.iter().all(|t| sections.iter().any(|s| s.target == *t)) { folder.finish() } else { Ok(()) }
+}
+
+/// The page with its sections in order: new ones as given, others as in the page `before`.
+fn page(before: &str, sections: &[Section]) -> String {
+    let mut text = TITLE.to_owned();
+    for target in Target::ALL {
+        let [begin, end] = ["begin", "end"].map(|edge| format!("<!-- {edge} {} -->\n", target.name()));
+        let body = match sections.iter().find(|s| s.target == target) {
+            Some(section) => section.markdown.as_str(),
+            None => match before.split_once(&begin).and_then(|(_, rest)| rest.split_once(&end)) {
+                Some((body, _)) => body,
+                None => continue,
+            },
+        };
+        text += &format!("\n{begin}{body}{end}");
+    }
+    text
+}
+
+/// A small or large number in two digits: 3.7e-5.
+fn short(value: f64) -> String {
+    if value == 0.0 {
+        "0".to_owned()
+    } else if value.is_infinite() {
+        "infinite".to_owned()
+    } else {
+        format!("{value:.1e}")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_section_takes_its_place_and_others_stay() {
+        let section = |target, text: &str| Section { target, markdown: format!("{text}\n"), figures: Vec::new() };
+        let first = page("", &[section(Target::Fig3, "old three"), section(Target::Audit, "old audit")]);
+        let second = page(&first, &[section(Target::Fig3, "new three"), section(Target::Table1, "table")]);
+        let at = |text: &str| second.find(text);
+        assert!(at("table\n") < at("new three") && at("new three") < at("old audit") && at("old three").is_none());
+        assert_eq!(page(&second, &[]), second);
+    }
+}

@@ -1,0 +1,174 @@
+//! Section IV-B: bearings from panoramas on a grid. Table II and Fig. 5 on the paper's own set, Fig. 7 on Vardy's.
+//!
+//! Neither set comes with the paper. The worlds `paper-grid` and `vardy-hall` have the same grids, sizes of picture and starts, and
+//! their panoramas are rendered; a set on disk takes their place where a person has one.
+
+use std::path::Path;
+use std::sync::Mutex;
+
+use super::ideal::Run;
+use super::objects::ObjectField;
+use super::trial::{PaperPilot, Terms, drive};
+use super::{BETA, LAWS, STARTS};
+use crate::control::printed::PrintedLaw;
+use crate::error::{Error, Result};
+use crate::estimation::paper::PaperSettings;
+use crate::geometry::Pose;
+use crate::panorama::Panorama;
+use crate::panorama_set::{Grid, Layout, PanoramaSet, Place};
+use crate::render::{CpuRenderer, Renderer, Scene, View};
+use crate::vision::ExtractorSettings;
+use crate::world::World;
+
+/// One of the two sets.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ImageSet {
+    /// 9 x 19 places, 29.25 cm apart, home (5, 10), 4680 x 480 pixels: reference 27 of the paper.
+    Paper,
+    /// 10 x 17 places, 30 cm apart, home (4, 8), 561 x 81 pixels: reference 28 of the paper.
+    Vardy,
+}
+
+impl ImageSet {
+    /// Both.
+    pub const ALL: [Self; 2] = [Self::Paper, Self::Vardy];
+
+    /// The world that is rendered for it.
+    #[must_use]
+    pub fn world_name(self) -> &'static str {
+        match self {
+            Self::Paper => "paper-grid",
+            Self::Vardy => "vardy-hall",
+        }
+    }
+
+    /// Its grid. Rows and columns count from 0 here; the paper's own set counts from 1.
+    #[must_use]
+    pub fn grid(self) -> Grid {
+        match self {
+            Self::Paper => Grid { rows: 9, columns: 19, spacing_m: 0.2925, home: Place { i: 4, j: 9 } },
+            Self::Vardy => Grid { rows: 10, columns: 17, spacing_m: 0.30, home: Place { i: 4, j: 8 } },
+        }
+    }
+
+    /// The layout of such a set on disk.
+    #[must_use]
+    pub fn layout(self) -> Layout {
+        match self {
+            Self::Paper => Layout::Paper,
+            Self::Vardy => Layout::Vardy,
+        }
+    }
+
+    /// Such a set on disk.
+    ///
+    /// # Errors
+    /// When it is not whole or has another grid.
+    pub fn open(self, folder: &Path) -> Result<PanoramaSet> {
+        let (files, grid) = (PanoramaSet::open(folder, self.layout())?, self.grid());
+        if files.shape() != (grid.rows, grid.columns) {
+            return Err(Error::Invalid {
+                what: format!("grid of the set in {}", folder.display()),
+                found: format!("{} x {} places", files.shape().0, files.shape().1),
+                allowed: format!("{} x {}", grid.rows, grid.columns),
+            });
+        }
+        Ok(files)
+    }
+
+    /// Settings that suit the size of its pictures.
+    fn extractor(self) -> ExtractorSettings {
+        match self {
+            Self::Paper => {
+                ExtractorSettings { octaves: 5, features: 1000, home_features: 1000, ..ExtractorSettings::default() }
+            }
+            Self::Vardy => ExtractorSettings::default(),
+        }
+    }
+}
+
+/// Bearings of a set's objects, and the starts and terms of runs on it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ImageCase {
+    /// Which set.
+    pub set: ImageSet,
+    /// Whether the panoramas are rendered; else they come from disk.
+    pub rendered: bool,
+    /// The panorama at home.
+    pub home: Panorama,
+    /// Its objects.
+    pub field: ObjectField,
+    /// The paper's starts, in the home frame.
+    pub starts: Vec<(&'static str, Pose)>,
+    /// Ts = 0.1 s, v, Rc and the limit.
+    pub terms: Terms,
+}
+
+impl ImageCase {
+    /// Extracts the objects of a set: of the one in `folder` where there is one, else of rendered panoramas.
+    ///
+    /// # Errors
+    /// When the set on disk is not whole, has another grid, or no objects can be found in it.
+    pub fn new(set: ImageSet, folder: Option<&Path>) -> Result<Self> {
+        let world = World::open(set.world_name())?;
+        let grid = set.grid();
+        let (home, field) = match folder {
+            Some(folder) => {
+                let files = set.open(folder)?;
+                ObjectField::extract(grid, &set.extractor(), &|place| files.load(place))?
+            }
+            None => {
+                let scene = Scene::new(&world)?;
+                // A renderer is taken from the shelf and put back: at most one a thread is made.
+                let shelf: Mutex<Vec<CpuRenderer>> = Mutex::default();
+                let render = |place: Place| -> Result<Panorama> {
+                    let taken = shelf.lock().ok().and_then(|mut shelf| shelf.pop());
+                    let mut renderer = taken.unwrap_or_default();
+                    let at = grid.position(place);
+                    let robot = world.home.compose(&Pose::new(at.x, at.y, 0.0));
+                    let mut panorama = Panorama::black(world.projection());
+                    let view = View { projection: world.projection(), robot, bodies: &world.body_poses() };
+                    renderer.render(&scene, &view, &mut panorama)?;
+                    if let Ok(mut shelf) = shelf.lock() {
+                        shelf.push(renderer);
+                    }
+                    Ok(panorama)
+                };
+                ObjectField::extract(grid, &set.extractor(), &render)?
+            }
+        };
+        let starts = STARTS.into_iter().map(|name| Ok((name, world.home.to_local(&world.named_start(name)?))));
+        let task = &world.spec.task;
+        let terms = Terms {
+            period_s: task.control_period_s,
+            speed_m_s: task.speed_m_s,
+            radius_m: task.arrival_radius_m,
+            limit_s: task.time_limit_s,
+        };
+        Ok(Self { set, rendered: folder.is_none(), home, field, starts: starts.collect::<Result<_>>()?, terms })
+    }
+
+    /// The paper's filter with its settings for images (M = I) but for those of `settings`, from all starts with both laws.
+    #[must_use]
+    pub fn runs(&self, settings: PaperSettings, initial: impl Fn(&Pose) -> Pose) -> Vec<Run> {
+        let home = self.field.home(3, SD_RAD);
+        let run = |law, start: Pose| {
+            let law = PrintedLaw { law, speed_m_s: self.terms.speed_m_s, radius_m: self.terms.radius_m, beta: BETA };
+            let mut pilot = PaperPilot::new(law, settings, &home, initial(&start))?;
+            Some(drive(&self.terms, start, &mut |pose| self.field.bearings(pose, 3, SD_RAD), false, &mut pilot))
+        };
+        LAWS.into_iter()
+            .flat_map(|law| self.starts.iter().map(move |&(name, start)| (law, name, start)))
+            .filter_map(|(law, name, start)| Some(Run { start: name, law, track: run(law, start)? }))
+            .collect()
+    }
+}
+
+/// What is stated of bearings that are interpolated between places, rad: about half a degree.
+pub const SD_RAD: f64 = 0.01;
+
+/// The paper's settings of the filter for images: Q = 0.01 I, M = I, P0 = I.
+#[must_use]
+pub fn image_settings() -> PaperSettings {
+    PaperSettings { measurement: 1.0, ..PaperSettings::default() }
+}
