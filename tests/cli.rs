@@ -518,3 +518,28 @@ fn a_trajectory_becomes_a_film_and_a_sheet() {
     assert_fails(&run(folder.path(), &["render", LAB]), 2, &["--pose", "--trajectory", "--sheet", "--bench"]);
     assert_fails(&run(folder.path(), &["render", LAB, "--bench"]), 2, &["--bench"]);
 }
+
+#[test]
+fn the_vision_report_keeps_its_pairs_to_itself() {
+    let folder = tempfile::tempdir().unwrap();
+    let report = |threads: &str, pairs: &str, out: &str| {
+        let arguments = ["vision-report", LAB, "--axis", "distance", "--keypoints", "150", "--pairs", pairs, "--out", out];
+        run(folder.path(), &[&arguments[..], &["--json", "--threads", threads]].concat())
+    };
+    let output = report("2", "pairs", "page");
+    assert_done(&output);
+    let printed: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let cells = printed["cells"].as_array().unwrap();
+    assert!(cells.len() == 5 && cells[0]["precision"].as_f64().unwrap() > 0.9, "{}", cells[0]);
+    let pairs: Value = serde_json::from_slice(&std::fs::read(folder.path().join("pairs/pairs.json")).unwrap()).unwrap();
+    for pair in pairs.as_array().unwrap() {
+        let name = pair["name"].as_str().unwrap();
+        assert!(folder.path().join("pairs").join(format!("{name}-range.png")).is_file(), "{name}");
+    }
+    assert_fails(&report("2", "pairs", "page"), 1, &["pairs"]);
+    assert_done(&report("1", "more", "again"));
+    for name in ["vision.csv", "errors.svg"] {
+        let read = |page: &str| std::fs::read(folder.path().join(page).join(name)).unwrap();
+        assert_eq!(read("page"), read("again"), "{name}");
+    }
+}

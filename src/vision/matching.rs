@@ -67,7 +67,7 @@ fn is_bright(feature: &Feature) -> bool {
 const ZOOM: f32 = 4.5;
 /// A plain descriptor this many times as far off as the limit is not worth stretching: that brings nearer what is related, not
 /// what is unrelated.
-const HOPELESS: f32 = 1.3;
+const HOPELESS: f32 = 1.15;
 
 impl Gallery {
     /// Describes every feature once plain and once for each of `stretches` by `describe(feature, stretch)`. `horizon` is the row of

@@ -47,7 +47,8 @@ pub enum Landmarks {
 pub struct ExtractorSettings {
     /// Octaves of the scale space; fewer are built where the panorama is too small.
     pub octaves: usize,
-    /// Least strength of a feature: difference of neighbouring Gaussian images, grey levels of 255.
+    /// Least strength of a feature: difference of neighbouring Gaussian images, grey levels of 255. It matters in the dark only; by
+    /// day the strongest features are far above.
     pub contrast: f32,
     /// Largest ratio of a feature's curvatures along its two axes: above, it is an edge.
     pub edge_ratio: f32,
@@ -104,7 +105,7 @@ impl Default for ExtractorSettings {
     fn default() -> Self {
         Self {
             octaves: 4,
-            contrast: 2.0,
+            contrast: 0.5,
             edge_ratio: 10.0,
             features: 500,
             home_features: 500,

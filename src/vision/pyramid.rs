@@ -138,7 +138,7 @@ impl Pyramid {
                 None => {
                     octave.step_x = 1.0;
                     octave.step_y = 1.0;
-                    blur(&self.luma, &mut octave.gauss[0], &mut self.line);
+                    blur(&self.luma, &mut octave.gauss[0], None, &mut self.line);
                 }
                 Some(finer) => {
                     halve(&finer.gauss[2], &mut octave.gauss[0]);
@@ -148,11 +148,9 @@ impl Pyramid {
             }
             let [g0, g1, g2] = &mut octave.gauss;
             let [d0, d1] = &mut octave.difference;
-            blur(g0, g1, &mut self.line);
-            subtract(g1, g0, d0);
-            blur(g1, &mut octave.scratch, &mut self.line);
-            blur(&octave.scratch, g2, &mut self.line);
-            subtract(g2, g1, d1);
+            blur(g0, g1, Some((g0, d0)), &mut self.line);
+            blur(g1, &mut octave.scratch, None, &mut self.line);
+            blur(&octave.scratch, g2, Some((g1, d1)), &mut self.line);
         }
     }
 }
@@ -170,14 +168,21 @@ fn luma(rgba: &[u8], luma: &mut [u16]) {
     }
 }
 
-/// Convolves with the binomial (1 4 6 4 1) / 16 both ways: variance 1.
+/// A finer image, and where the difference of a coarser one from it belongs.
+type Difference<'a> = (&'a Image<u16>, &'a mut Image<i16>);
+
+/// Convolves with the binomial (1 4 6 4 1) / 16 both ways: variance 1. The difference of the result from a finer image is taken
+/// along while the result is at hand.
 #[multiversion::multiversion(targets(
     "x86_64+avx512f+avx512bw+avx512dq+avx512vl+avx2+bmi1+bmi2+lzcnt+popcnt",
     "x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"
 ))]
-fn blur(source: &Image<u16>, target: &mut Image<u16>, line: &mut Vec<u16>) {
+fn blur(source: &Image<u16>, target: &mut Image<u16>, mut difference: Option<Difference<'_>>, line: &mut Vec<u16>) {
     let (width, height) = (source.width, source.height);
     target.resize(width, height);
+    if let Some((_, difference)) = &mut difference {
+        difference.resize(width, height);
+    }
     line.resize(width + 4, 0);
     for y in 0..height {
         let row = |dy: isize| source.row(y.saturating_add_signed(dy).min(height - 1));
@@ -192,8 +197,20 @@ fn blur(source: &Image<u16>, target: &mut Image<u16>, line: &mut Vec<u16>) {
         line[width + 3] = line[3];
         let out = target.row_mut(y);
         let (a, b, c, d, e) = (&line[..width], &line[1..=width], &line[2..width + 2], &line[3..width + 3], &line[4..]);
-        for (((((out, a), b), c), d), e) in out.iter_mut().zip(a).zip(b).zip(c).zip(d).zip(e) {
-            *out = binomial(*a, *b, *c, *d, *e);
+        let taps = a.iter().zip(b).zip(c).zip(d).zip(e).map(|((((a, b), c), d), e)| binomial(*a, *b, *c, *d, *e));
+        match &mut difference {
+            None => {
+                for (out, value) in out.iter_mut().zip(taps) {
+                    *out = value;
+                }
+            }
+            Some((finer, difference)) => {
+                let places = out.iter_mut().zip(difference.row_mut(y)).zip(finer.row(y));
+                for (((out, difference), finer), value) in places.zip(taps) {
+                    *out = value;
+                    *difference = value.wrapping_sub(*finer) as i16;
+                }
+            }
         }
         target.close(y);
     }
@@ -226,19 +243,6 @@ fn halve(source: &Image<u16>, target: &mut Image<u16>) {
             }
         }
         target.close(y);
-    }
-}
-
-#[multiversion::multiversion(targets(
-    "x86_64+avx512f+avx512bw+avx512dq+avx512vl+avx2+bmi1+bmi2+lzcnt+popcnt",
-    "x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"
-))]
-fn subtract(coarse: &Image<u16>, fine: &Image<u16>, target: &mut Image<i16>) {
-    target.resize(coarse.width, coarse.height);
-    for y in 0..coarse.height {
-        for ((t, c), f) in target.row_mut(y).iter_mut().zip(coarse.row(y)).zip(fine.row(y)) {
-            *t = c.wrapping_sub(*f) as i16;
-        }
     }
 }
 
