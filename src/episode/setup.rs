@@ -12,6 +12,7 @@ use super::sensor::{
     CompassSensor, Degradation, DegradedSensor, IdealSensor, Noise, NoisySensor, RenderedSensor, Sensor, Sight,
 };
 use crate::error::{Error, Result};
+use crate::estimation::anchored::FilterSettings;
 use crate::geometry::Pose;
 use crate::observation::{Briefing, HomeSnapshot, RobotSheet, TaskSheet};
 use crate::panorama::Projection;
@@ -106,6 +107,8 @@ pub struct Setup {
     pub method: MethodKind,
     /// How it steers.
     pub law: LawKind,
+    /// Knobs of the anchored filter; the track is the robot's, whatever they say.
+    pub filter: FilterSettings,
     /// What renders, for [`Bearings::Rendered`].
     pub renderer: RendererChoice,
     /// Columns and rows of the panorama where they differ from the world's.
@@ -140,6 +143,7 @@ impl Default for Setup {
             bearings: Bearings::Rendered,
             method: MethodKind::AnchoredEkf,
             law: LawKind::Proportional,
+            filter: FilterSettings::default(),
             renderer: RendererChoice::Auto,
             size_px: None,
             extractor: ExtractorSettings::default(),
@@ -268,7 +272,7 @@ impl<'a> Bench<'a> {
         let task = setup.task(world);
         let briefing = setup.briefing(world, sensor.home().clone());
         let initial = if setup.told_start { Some(world.home.to_local(&start)) } else { setup.initial_estimate };
-        let mut method = method::build(setup.method, setup.law, briefing, initial)?;
+        let mut method = method::build(setup.method, setup.law, setup.filter, briefing, initial)?;
         let parts = Parts { plant: plant.as_mut(), sensor: sensor.as_mut(), method: method.as_mut() };
         run(parts, world.home, &task, watch)
     }

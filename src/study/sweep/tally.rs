@@ -1,0 +1,1 @@
+//! Counting what the rows of a study say.
