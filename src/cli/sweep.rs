@@ -18,7 +18,8 @@ use super::args::seeds;
 use super::context::{Context, default_folder, print};
 
 /// Shown under `sweep --help`.
-pub const HELP: &str = "A study file names a world, settings, axes and seeds; worlds/studies/ has some, which go by their names too.
+pub const HELP: &str =
+    "A study file names a world, settings, axes and seeds; worlds/studies/ has some, which go by their names too.
 The same command goes on where a killed one was. The rows in rows.parquet depend on the study alone.
 
 Shards: --shard 2/8 runs every eighth chunk from the second on. Without --shard, an array job of Slurm is a shard by
@@ -74,7 +75,8 @@ pub enum SweepCommand {
 /// `DIR:ROW`.
 pub fn row(text: &str) -> Result<(PathBuf, u64), String> {
     let parts = text.rsplit_once(':').and_then(|(folder, row)| Some((folder, row.parse().ok()?)));
-    let (folder, row) = parts.filter(|(folder, _)| !folder.is_empty()).ok_or("a row is DIR:ROW, such as results/runs/sweep:17")?;
+    let (folder, row) =
+        parts.filter(|(folder, _)| !folder.is_empty()).ok_or("a row is DIR:ROW, such as results/runs/sweep:17")?;
     Ok((PathBuf::from(folder), row))
 }
 

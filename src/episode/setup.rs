@@ -236,6 +236,25 @@ impl<'a> Bench<'a> {
         Ok(Self { world, setup, camera })
     }
 
+    /// The packed world as it was at home and as it is on the way; `None` for a sensor without a camera.
+    #[must_use]
+    pub fn scenes(&self) -> Option<[Arc<Scene>; 2]> {
+        self.camera.as_ref().map(|camera| camera.scenes.clone())
+    }
+
+    /// As [`Bench::new`], with the scenes of another bench on an equal world with the same [`Setup::looks`]: packing a world, its
+    /// textures above all, takes longer than a short run.
+    ///
+    /// # Errors
+    /// When the renderer cannot be had.
+    pub fn with_scenes(world: &'a World, setup: &'a Setup, scenes: [Arc<Scene>; 2]) -> Result<Self> {
+        let camera = match setup.bearings {
+            Bearings::Rendered => Some(Camera { scenes, renderer: render::create(setup.renderer)? }),
+            Bearings::Ideal | Bearings::Noisy => None,
+        };
+        Ok(Self { world, setup, camera })
+    }
+
     /// A second bench for another thread; it shares the packed world and has a renderer of its own.
     ///
     /// # Errors

@@ -55,7 +55,8 @@ impl Draft {
     /// # Errors
     /// When the place leads into a list entry that is not there.
     pub fn set(&mut self, place: &str, value: &impl Serialize) -> Result<()> {
-        let node = Node::from_spec(value).map_err(|e| invalid(&self.source, place, &e.to_string(), "a value of a world file"))?;
+        let node =
+            Node::from_spec(value).map_err(|e| invalid(&self.source, place, &e.to_string(), "a value of a world file"))?;
         self.changes += &format!("\n{place} = {}", serde_json::to_string(value).unwrap_or_default());
         let steps: Vec<&str> = place.split(['.', '[']).map(|step| step.strip_suffix(']').unwrap_or(step)).collect();
         let source = &self.source;

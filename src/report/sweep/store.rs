@@ -71,10 +71,7 @@ impl StudyFolder {
     /// # Errors
     /// When the folder cannot be created or read, or holds anything but rows of this study made by this version.
     pub fn create(path: &Path, study: Study, source: &Path, keep_failures: bool) -> Result<Self> {
-        for folder in [path.to_owned(), path.join(PARTS)] {
-            fs::create_dir_all(&folder).map_err(io_error("create folder", &folder))?;
-        }
-        let held = files(path)?;
+        let held = if path.is_dir() { files(path)? } else { Vec::new() };
         let ours = |name: &String| [MARKER, STUDY, RECORD, ROWS, PARTS, FAILURES].contains(&name.as_str());
         let known = |name: &String| ours(name) || name.starts_with(RATE) || name.ends_with(PARTIAL) || is_report(name);
         let foreign = held.iter().find(|name| !known(name));
@@ -82,6 +79,7 @@ impl StudyFolder {
             return Err(Error::OutputTaken { path: path.to_owned(), found: format!("`{name}`") });
         }
         let identity = Identity::of(&study);
+        let parts = path.join(PARTS);
         if path.join(RECORD).is_file() {
             let record = read_record(path)?;
             let held = Identity { study: record.study, sha256: record.study_sha256, version: record.version };
@@ -89,6 +87,7 @@ impl StudyFolder {
                 return Err(Error::OutputTaken { path: path.to_owned(), found: format!("rows of {difference}") });
             }
         } else {
+            fs::create_dir_all(&parts).map_err(io_error("create folder", &parts))?;
             let record = StudyRecord {
                 study: identity.study,
                 study_sha256: identity.sha256,

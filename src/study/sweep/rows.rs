@@ -23,7 +23,7 @@ const MEASURES: [Measure; 21] = [
     ("straight_line_time_s", |s| s.straight_line_time_s),
     ("time_ratio", |s| s.time_ratio),
     ("path_length_m", |s| Some(s.path_length_m)),
-    ("start_distance_m", |s| Some(s.start_distance_m)),
+    ("initial_distance_m", |s| Some(s.start_distance_m)),
     ("start_x_m", |s| Some(s.start.x_m)),
     ("start_y_m", |s| Some(s.start.y_m)),
     ("start_heading_rad", |s| Some(s.start.heading_rad)),
@@ -99,7 +99,13 @@ impl Row {
 
     /// The row of an episode that has no result: `outcome` is [`PANIC`] or [`ERROR`].
     #[must_use]
-    pub fn without_result(episode: u64, (cell, seed): (u64, u64), values: &Arc<[Value]>, outcome: &str, reason: String) -> Self {
+    pub fn without_result(
+        episode: u64,
+        (cell, seed): (u64, u64),
+        values: &Arc<[Value]>,
+        outcome: &str,
+        reason: String,
+    ) -> Self {
         Self {
             episode,
             cell,

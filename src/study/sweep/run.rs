@@ -9,8 +9,9 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use super::rows::{ERROR, PANIC, Row};
 use super::spec::{Chunk, Study};
 use super::value::Value;
-use crate::episode::{Bench, Progress, Record, Setup, Summary};
+use crate::episode::{Bench, Look, Progress, Record, Setup, Summary};
 use crate::error::{Error, Result};
+use crate::render::Scene;
 use crate::world::World;
 
 /// Where a study's rows go.
@@ -59,10 +60,11 @@ pub fn run(
 ) -> Result<()> {
     let (next, stop) = (AtomicUsize::new(0), AtomicBool::new(false));
     let work = || -> Result<()> {
+        let mut packed = None;
         while let Some(&index) = chunks.get(next.fetch_add(1, Ordering::Relaxed)) {
             let halted = || stop.load(Ordering::Relaxed) || stopped();
             let chunk = study.chunk(index);
-            let rows = run_chunk(study, &chunk, store, watch, &halted)?;
+            let rows = run_chunk(study, &chunk, &mut packed, store, watch, &halted)?;
             store.keep(&chunk, &rows)?;
         }
         Ok(())
@@ -97,6 +99,7 @@ pub fn run(
 fn run_chunk(
     study: &Study,
     chunk: &Chunk,
+    packed: &mut Option<Packed>,
     store: &dyn Store,
     watch: &(dyn Fn(&Row) -> ControlFlow<()> + Sync),
     halted: &dyn Fn() -> bool,
@@ -110,7 +113,7 @@ fn run_chunk(
         let row = match &case {
             Err(error) => failed(ERROR, in_full(error)),
             Ok((world, setup)) => {
-                let ran = attempt(|| run_episode(&mut bench, world, setup, seed, halted));
+                let ran = attempt(|| run_episode(&mut bench, packed, world, setup, seed, halted));
                 match ran {
                     Ok(Ok((record, summary))) => {
                         let row = Row::of(episode, chunk.cell, &values, &summary);
@@ -136,8 +139,30 @@ fn run_chunk(
     Ok(rows)
 }
 
+/// A packed world that the next cell may be able to use: neighbouring cells often differ in other things than looks.
+struct Packed {
+    world_sha256: String,
+    looks: [Look; 2],
+    scenes: [Arc<Scene>; 2],
+}
+
+/// The bench of a cell, packed anew only where the last one was of another world or other looks.
+fn bench_of<'a>(packed: &mut Option<Packed>, world: &'a World, setup: &'a Setup) -> Result<Bench<'a>> {
+    if let Some(Packed { world_sha256, looks, scenes }) = packed
+        && *world_sha256 == world.sha256
+        && *looks == setup.looks()
+    {
+        return Bench::with_scenes(world, setup, scenes.clone());
+    }
+    let bench = Bench::new(world, setup)?;
+    let keep = |scenes| Packed { world_sha256: world.sha256.clone(), looks: setup.looks(), scenes };
+    *packed = bench.scenes().map(keep);
+    Ok(bench)
+}
+
 fn run_episode<'a>(
     bench: &mut Option<Bench<'a>>,
+    packed: &mut Option<Packed>,
     world: &'a World,
     setup: &'a Setup,
     seed: u64,
@@ -145,7 +170,7 @@ fn run_episode<'a>(
 ) -> Result<(Record, Summary)> {
     let bench = match bench {
         Some(bench) => bench,
-        None => bench.insert(Bench::new(world, setup)?),
+        None => bench.insert(bench_of(packed, world, setup)?),
     };
     let watch = &mut |_: &Progress| if halted() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) };
     let record = bench.run(seed, watch)?;
@@ -165,7 +190,7 @@ pub fn replay(study: &Study, episode: u64) -> Result<(World, Setup, Record, Summ
     let (cell, seed) = study.place(episode);
     let values: Arc<[Value]> = study.values(cell).into();
     let (world, setup) = study.case(&values)?;
-    let (record, summary) = run_episode(&mut None, &world, &setup, seed, &|| false)?;
+    let (record, summary) = run_episode(&mut None, &mut None, &world, &setup, seed, &|| false)?;
     let row = Row::of(episode, cell, &values, &summary);
     Ok((world, setup, record, summary, row))
 }

@@ -49,9 +49,7 @@ const SETTINGS: &[(&str, &str, Apply)] = &[
         case.setup.compass_sd_rad = Some(at_least_0(value)?.to_radians());
         Ok(())
     }),
-    ("plant", "what moves", |case, value| {
-        choose(&mut case.setup.plant, &[PlantKind::Rapier, PlantKind::Unicycle], value)
-    }),
+    ("plant", "what moves", |case, value| choose(&mut case.setup.plant, &[PlantKind::Rapier, PlantKind::Unicycle], value)),
     ("bearings", "where bearings come from", |case, value| {
         choose(&mut case.setup.bearings, &[Bearings::Rendered, Bearings::Ideal, Bearings::Noisy], value)
     }),
@@ -126,10 +124,11 @@ const SETTINGS: &[(&str, &str, Apply)] = &[
     ("image_noise_electrons", "read noise of the camera on the way and at home", |case, value| {
         let read = at_least_0(value)?;
         let saturation = 10_000.0; // of the decent camera
-        put(case, "camera.optics.noise", &std::collections::BTreeMap::from([
-            ("saturation_electrons", saturation),
-            ("read_electrons", read),
-        ]))
+        put(
+            case,
+            "camera.optics.noise",
+            &std::collections::BTreeMap::from([("saturation_electrons", saturation), ("read_electrons", read)]),
+        )
     }),
 ];
 
@@ -166,6 +165,12 @@ pub(super) fn exists(name: &str) -> bool {
     SETTINGS.iter().any(|(known, ..)| *known == name)
         || all_names().contains(&without_entries(name))
         || name.strip_prefix("world.").is_some_and(|place| place.contains('['))
+}
+
+/// Whether there are settings whose names go on from this one, as `world.floor.friction` does from `world.floor`.
+pub(super) fn has_parts(name: &str) -> bool {
+    let beginning = format!("{name}.");
+    all_names().iter().any(|known| known.starts_with(&beginning))
 }
 
 /// All settings with a few words each; fields of the world, the filter and the extractor without.

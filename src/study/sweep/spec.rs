@@ -21,8 +21,9 @@ pub const MOST_EPISODES: u64 = 100_000_000;
 /// Most episodes in one chunk, the unit in which a study is run, stored and resumed.
 const CHUNK_EPISODES: u64 = 20;
 /// Studies that the program carries with it, as (name, TOML text).
-const BUILTIN: [(&str, &str); 3] = [
+const BUILTIN: [(&str, &str); 4] = [
     ("slip-occlusion", include_str!("../../../worlds/studies/slip-occlusion.toml")),
+    ("wet-hall", include_str!("../../../worlds/studies/wet-hall.toml")),
     ("light-camera", include_str!("../../../worlds/studies/light-camera.toml")),
     ("faults-sobol", include_str!("../../../worlds/studies/faults-sobol.toml")),
 ];
@@ -299,8 +300,7 @@ struct Reader<'a> {
 }
 
 /// Fields of the file, and of an axis.
-const FIELDS: [&str; 10] =
-    ["name", "description", "world", "seed", "seeds", "design", "points", "settings", "axes", "compare"];
+const FIELDS: [&str; 10] = ["name", "description", "world", "seed", "seeds", "design", "points", "settings", "axes", "compare"];
 const AXIS_FIELDS: [&str; 6] = ["setting", "label", "values", "from", "to", "scale"];
 
 impl Reader<'_> {
@@ -353,20 +353,8 @@ impl Reader<'_> {
         }
         let description = tree.get("description").and_then(Node::text).unwrap_or_default().to_owned();
         let text = text.to_owned();
-        let study = Study {
-            name,
-            description,
-            world,
-            world_sha256,
-            seed,
-            seeds,
-            design,
-            points,
-            settings,
-            axes,
-            compare,
-            text,
-        };
+        let study =
+            Study { name, description, world, world_sha256, seed, seeds, design, points, settings, axes, compare, text };
         let size = study.axes.iter().try_fold(study.points * study.episodes_per_cell(), |size, axis| {
             let levels = if let Levels::Listed(values) = &axis.levels { values.len() as u64 } else { 1 };
             size.checked_mul(levels).filter(|size| *size <= MOST_EPISODES)
@@ -468,8 +456,8 @@ impl Reader<'_> {
     fn setting(&mut self, tree: &Node, name: &str, node: &Node, found: &mut Vec<(String, Value)>) {
         if let Read::Table(entries) = &node.value {
             let inner = |key: &str| format!("{name}.{key}");
-            // A table is a value of its own only where its entries are no settings: `world.floor` with a `friction` is none.
-            if !settings::exists(name) || entries.iter().all(|(key, _)| settings::exists(&inner(key))) {
+            // A table is a value of its own only in a list's entry, whose shape or texture is set as a whole.
+            if !settings::exists(name) || settings::has_parts(name) {
                 entries.iter().for_each(|(key, node)| self.setting(tree, &inner(key), node, found));
                 return;
             }
@@ -477,7 +465,13 @@ impl Reader<'_> {
         match Value::read(node) {
             _ if !settings::exists(name) => {
                 let (found, allowed) = ("no setting".to_owned(), settings::near(name));
-                self.faults.push(WorldFault { place: format!("settings.{name}"), found, allowed, owner: None, line: node.line });
+                self.faults.push(WorldFault {
+                    place: format!("settings.{name}"),
+                    found,
+                    allowed,
+                    owner: None,
+                    line: node.line,
+                });
             }
             Some(value) => found.push((name.to_owned(), value)),
             None => self.fault(tree, &format!("settings.{name}"), node.describe(), "a number, a text, a list or a table"),
