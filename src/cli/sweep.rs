@@ -9,7 +9,7 @@ use std::time::Instant;
 use anyhow::Result;
 use serde::Serialize;
 use wayhome::Error;
-use wayhome::report::sweep::{Rate, StudyFolder};
+use wayhome::report::sweep::{self as page, Rate, StudyFolder};
 use wayhome::study::statistics::wilson_95;
 use wayhome::study::sweep::{Row, Study, catalogue, run as run_chunks};
 
@@ -69,6 +69,15 @@ pub enum SweepCommand {
         /// Folder for all rows
         #[arg(long, value_name = "DIR")]
         out: PathBuf,
+    },
+    /// Make the page of a study: heat maps, curves, paired differences, failures, settings
+    Report {
+        /// Folder of a complete study
+        #[arg(value_name = "DIR")]
+        study: PathBuf,
+        /// Folder for the page, its figures and tables [default: DIR/report]
+        #[arg(long, value_name = "DIR")]
+        out: Option<PathBuf>,
     },
 }
 
@@ -135,6 +144,7 @@ struct Output {
 pub fn run(args: &SweepArgs, context: &Context) -> Result<Verdict> {
     match (&args.command, &args.study) {
         (Some(SweepCommand::Merge { shards, out }), _) => merge(shards, out, context),
+        (Some(SweepCommand::Report { study, out }), _) => report(study, out.as_deref(), context),
         (None, Some(study)) => sweep(args, study, context),
         (None, None) => {
             let mut text = String::new();
@@ -241,6 +251,21 @@ fn merge(shards: &[PathBuf], out: &Path, context: &Context) -> Result<Verdict> {
     let complete = folder.complete()?;
     let rate = Rate { threads: 0, episodes: 0, wall_s: 0.0, episodes_per_minute: 0.0 };
     report_end(context, &folder, [1, 1], complete, rate)?;
+    Ok(Verdict::Done)
+}
+
+fn report(study: &Path, out: Option<&Path>, context: &Context) -> Result<Verdict> {
+    let folder = StudyFolder::open(study)?;
+    let out = out.map_or_else(|| study.join("report"), Path::to_owned);
+    let bar = context.progress(None)?;
+    page::write(&folder, &out, &mut || {
+        bar.set_message("running failures again");
+        bar.tick();
+        if context.is_stopped() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    })?;
+    bar.finish_and_clear();
+    let page = out.join("index.html").display().to_string();
+    context.print(&serde_json::json!({ "page": page }), || format!("page    {page}\n"))?;
     Ok(Verdict::Done)
 }
 

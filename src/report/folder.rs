@@ -25,7 +25,7 @@ pub struct OutputFolder {
 
 impl OutputFolder {
     /// Opens or creates the folder for `verb`, which writes files of the given names. A `#` in a name stands for any number:
-    /// `frame-#.png`.
+    /// `frame-#.png`; a `*` before it for any beginning: `*.svg`.
     ///
     /// # Errors
     /// When the folder cannot be created or read, or holds what `verb` has not written.
@@ -120,13 +120,20 @@ pub(super) fn files(path: &Path) -> Result<Vec<String>> {
 
 /// Whether a file's name is one of `names`.
 fn is_announced(names: &[&str], file: &str) -> bool {
-    names.iter().any(|name| match name.split_once('#') {
-        None => *name == file,
+    names.iter().any(|name| match name.strip_prefix('*') {
+        Some(ending) => file.ends_with(ending),
+        None => is_numbered(name, file),
+    })
+}
+
+fn is_numbered(name: &str, file: &str) -> bool {
+    match name.split_once('#') {
+        None => name == file,
         Some((before, after)) => {
             let number = file.strip_prefix(before).and_then(|rest| rest.strip_suffix(after));
             number.is_some_and(|n| !n.is_empty() && n.bytes().all(|b| b.is_ascii_digit()))
         }
-    })
+    }
 }
 
 /// A file that is being written piece by piece, so that nobody has to hold all of it; see [`OutputFolder::begin`].

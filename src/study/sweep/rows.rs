@@ -132,6 +132,12 @@ impl Row {
         self.claimed_home == Some(true) && !self.is_home()
     }
 
+    /// The number in a column of whole numbers.
+    #[must_use]
+    pub fn count(&self, column: &str) -> Option<i64> {
+        COUNTS.iter().position(|(name, _)| *name == column).and_then(|k| self.counts[k])
+    }
+
     /// The number in a column of real numbers.
     #[must_use]
     pub fn measure(&self, column: &str) -> Option<f64> {
