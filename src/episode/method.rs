@@ -54,11 +54,17 @@ pub enum LawKind {
     Lyapunov,
 }
 
-/// Builds a method. `initial` is the pose in the home frame that `paper-ekf` is started from; others must not get one.
+/// Builds a method. `filter` is for `anchored-ekf`; `initial` is the pose in the home frame that `paper-ekf` is started from; others must not get one.
 ///
 /// # Errors
 /// When the method needs more of the home snapshot than there is, or `initial` is given to a method that takes none.
-pub fn build(kind: MethodKind, law: LawKind, briefing: Briefing, initial: Option<Pose>) -> Result<Box<dyn Method>> {
+pub fn build(
+    kind: MethodKind,
+    law: LawKind,
+    filter: FilterSettings,
+    briefing: Briefing,
+    initial: Option<Pose>,
+) -> Result<Box<dyn Method>> {
     let law = match law {
         LawKind::Proportional => Law::Proportional,
         LawKind::Lyapunov => Law::Lyapunov,
@@ -81,7 +87,7 @@ pub fn build(kind: MethodKind, law: LawKind, briefing: Briefing, initial: Option
     }
     let vector = |law, briefing| Box::new(VectorHoming::new(law, controller, briefing));
     Ok(match kind {
-        MethodKind::AnchoredEkf => Box::new(AnchoredHoming::new(FilterSettings::default(), controller, &briefing)),
+        MethodKind::AnchoredEkf => Box::new(AnchoredHoming::new(filter, controller, &briefing)),
         MethodKind::PaperEkf => Box::new(PaperHoming::new(controller, briefing, initial)),
         MethodKind::Alv => vector(VectorLaw::Alv, briefing),
         MethodKind::TronDaniilidis => vector(VectorLaw::TronDaniilidis, briefing),

@@ -8,9 +8,9 @@ use std::path::{Path, PathBuf};
 use crate::error::{Error, Result};
 
 /// File that marks a folder as ours; it holds the name of the verb that writes it.
-const MARKER: &str = ".wayhome";
+pub(super) const MARKER: &str = ".wayhome";
 /// Ending of files that are still being written.
-const PARTIAL: &str = ".wayhome-partial";
+pub(super) const PARTIAL: &str = ".wayhome-partial";
 
 /// A folder of results that one verb of the program writes.
 ///
@@ -25,7 +25,7 @@ pub struct OutputFolder {
 
 impl OutputFolder {
     /// Opens or creates the folder for `verb`, which writes files of the given names. A `#` in a name stands for any number:
-    /// `frame-#.png`.
+    /// `frame-#.png`; a `*` before it for any beginning: `*.svg`.
     ///
     /// # Errors
     /// When the folder cannot be created or read, or holds what `verb` has not written.
@@ -109,7 +109,7 @@ impl OutputFolder {
 }
 
 /// Names of what is in a folder, sorted.
-fn files(path: &Path) -> Result<Vec<String>> {
+pub(super) fn files(path: &Path) -> Result<Vec<String>> {
     let mut names = Vec::new();
     for entry in fs::read_dir(path).map_err(io_error("read folder", path))? {
         names.push(entry.map_err(io_error("read folder", path))?.file_name().to_string_lossy().into_owned());
@@ -120,13 +120,20 @@ fn files(path: &Path) -> Result<Vec<String>> {
 
 /// Whether a file's name is one of `names`.
 fn is_announced(names: &[&str], file: &str) -> bool {
-    names.iter().any(|name| match name.split_once('#') {
-        None => *name == file,
+    names.iter().any(|name| match name.strip_prefix('*') {
+        Some(ending) => file.ends_with(ending),
+        None => is_numbered(name, file),
+    })
+}
+
+fn is_numbered(name: &str, file: &str) -> bool {
+    match name.split_once('#') {
+        None => name == file,
         Some((before, after)) => {
             let number = file.strip_prefix(before).and_then(|rest| rest.strip_suffix(after));
             number.is_some_and(|n| !n.is_empty() && n.bytes().all(|b| b.is_ascii_digit()))
         }
-    })
+    }
 }
 
 /// A file that is being written piece by piece, so that nobody has to hold all of it; see [`OutputFolder::begin`].
@@ -168,13 +175,15 @@ pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<()> {
     })
 }
 
+/// A name that no other process takes at the same time, on this machine or on another one that sees the folder.
 fn partial_name(path: &Path) -> PathBuf {
+    let since = std::time::UNIX_EPOCH.elapsed().unwrap_or_default();
     let mut name = path.file_name().unwrap_or_default().to_owned();
-    name.push(PARTIAL);
+    name.push(format!(".{:x}-{:x}{PARTIAL}", std::process::id(), since.as_nanos()));
     path.with_file_name(name)
 }
 
-fn remove(path: &Path) -> Result<()> {
+pub(super) fn remove(path: &Path) -> Result<()> {
     match fs::remove_file(path) {
         Err(source) if source.kind() != io::ErrorKind::NotFound => {
             Err(Error::Io { action: "remove", path: path.to_owned(), source })
@@ -183,7 +192,7 @@ fn remove(path: &Path) -> Result<()> {
     }
 }
 
-fn io_error(action: &'static str, path: &Path) -> impl Fn(io::Error) -> Error {
+pub(super) fn io_error(action: &'static str, path: &Path) -> impl Fn(io::Error) -> Error {
     move |source| Error::Io { action, path: path.to_owned(), source }
 }
 

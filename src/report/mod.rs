@@ -18,6 +18,7 @@ pub mod robustness;
 pub mod run;
 pub mod seeds;
 pub mod sheet;
+pub mod sweep;
 pub mod text;
 pub mod vision;
 

@@ -275,7 +275,8 @@ impl Path {
             bodies: Vec::new(),
         };
         let briefing = setup.briefing(world, sensor.home().clone());
-        let mut method = method::build(MethodKind::AnchoredEkf, LawKind::Proportional, briefing, None)?;
+        let mut method =
+            method::build(MethodKind::AnchoredEkf, LawKind::Proportional, FilterSettings::default(), briefing, None)?;
         let task = setup.task(world);
         let parts = Parts { plant: &mut plant, sensor: &mut sensor, method: method.as_mut() };
         let record = run(parts, world.home, &task, &mut |_| ControlFlow::Continue(()))?;
