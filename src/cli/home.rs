@@ -46,6 +46,7 @@ pub fn run(args: &HomeArgs, context: &Context) -> Result<Verdict> {
 fn single(args: &HomeArgs, context: &Context, world: &World, setup: &Setup) -> Result<Verdict> {
     let seed = args.seed.to_string();
     let out = args.out.clone().unwrap_or_else(|| default_folder(&["home", &world.spec.name, &seed]));
+    setup.method.check()?;
     setup.start_pose(world, wayhome::random::Seed(args.seed))?; // before a folder is made for a run that cannot start
     let folder = OutputFolder::open(&out, "home", run_report::FILES)?;
     let bar = context.progress(None)?;
@@ -65,6 +66,7 @@ fn single(args: &HomeArgs, context: &Context, world: &World, setup: &Setup) -> R
 fn batch(args: &HomeArgs, context: &Context, world: &World, setup: &Setup, seeds: &RangeInclusive<u64>) -> Result<Verdict> {
     let range = format!("{}..{}", seeds.start(), seeds.end());
     let out = args.out.clone().unwrap_or_else(|| default_folder(&["home", &world.spec.name, &range]));
+    setup.method.check()?;
     let folder = OutputFolder::open(&out, "home --seeds", seeds_report::FILES)?;
     let bar = context.progress(Some(seeds.end() - seeds.start() + 1))?;
     bar.tick();
@@ -102,7 +104,7 @@ fn setup(args: &HomeArgs) -> Result<Setup, Error> {
     Ok(Setup {
         plant: args.plant,
         bearings: args.bearings,
-        method: args.method,
+        method: args.patience.method(&args.method),
         law: args.controller,
         renderer: args.renderer,
         size_px: args.size,

@@ -9,6 +9,7 @@ mod compare;
 mod context;
 mod drive;
 mod home;
+mod method_args;
 mod observability;
 mod physics_report;
 mod render;

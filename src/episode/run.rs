@@ -8,6 +8,7 @@ use super::sensor::Sensor;
 use crate::error::{Error, Result};
 use crate::geometry::{Pose, Twist, wrap};
 use crate::observation::{Estimate, Method, Observation, Odometry, Status};
+use crate::panorama::Panorama;
 use crate::physics::{Collision, Plant};
 use crate::world::TaskSpec;
 
@@ -71,7 +72,8 @@ pub fn run(
         let bearings = parts.sensor.observe(truth, drive.plant.body_poses())?;
         let deciding = Instant::now();
         let compass_rad = parts.sensor.compass_rad(truth);
-        let seen = Observation { time_s, odometry: drive.odometry, bearings: &bearings, compass_rad };
+        let panorama = parts.sensor.panorama().map(Panorama::picture);
+        let seen = Observation { time_s, odometry: drive.odometry, bearings: &bearings, compass_rad, panorama };
         let decision = parts.method.step(&seen);
         timing.estimation_s += deciding.elapsed().as_secs_f64();
         if steps.is_empty() {
@@ -93,6 +95,7 @@ pub fn run(
         match decision.status {
             Status::Arrived => break (Ending::Claimed, time_s),
             Status::Lost => break (Ending::GaveUp, time_s),
+            Status::Failed => break (Ending::Broke, time_s),
             Status::Running if time_s >= task.time_limit_s => break (Ending::Timeout, time_s),
             Status::Running if is_stuck(&steps, task.control_period_s) => break (Ending::Stuck, time_s),
             Status::Running => {}
@@ -109,6 +112,7 @@ pub fn run(
     let mut record = Record {
         outcome: Outcome::Lost,
         claimed_home: ending == Ending::Claimed,
+        failure: parts.method.failure().map(str::to_owned),
         time_s,
         collisions: drive.collisions,
         home,
@@ -123,6 +127,7 @@ pub fn run(
         Ending::Claimed | Ending::GaveUp => Outcome::Lost,
         Ending::Timeout => Outcome::Timeout,
         Ending::Stuck => Outcome::Stuck,
+        Ending::Broke => Outcome::Failed,
     };
     let sensing = parts.sensor.timing();
     let wall_s = began.elapsed().as_secs_f64();
@@ -144,6 +149,7 @@ enum Ending {
     GaveUp,
     Timeout,
     Stuck,
+    Broke,
 }
 
 /// The plant with what it reported since the last step.

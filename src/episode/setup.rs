@@ -13,8 +13,8 @@ use super::sensor::{
 };
 use crate::error::{Error, Result};
 use crate::geometry::Pose;
-use crate::observation::{Briefing, HomeSnapshot, RobotSheet, TaskSheet};
-use crate::panorama::Projection;
+use crate::observation::{Briefing, CameraSheet, RobotSheet, TaskSheet};
+use crate::panorama::{Panorama, Projection};
 use crate::physics::{Plant, RapierPlant, UnicyclePlant};
 use crate::random::Seed;
 use crate::render::{self, Renderer, RendererChoice, Scene};
@@ -120,8 +120,8 @@ pub struct Setup {
     pub noise: Noise,
     /// What is done to the bearings of any sensor on top of that.
     pub degradation: Degradation,
-    /// Standard deviation of the readings of the robot's compass, rad; `None` for a robot without one. Only methods that steer
-    /// by a homing vector read it.
+    /// Standard deviation of the readings of the robot's compass, rad; `None` for a robot without one. Methods that
+    /// estimate where home is leave it alone.
     pub compass_sd_rad: Option<f64>,
     /// Where runs start.
     pub start: Start,
@@ -178,8 +178,15 @@ impl Setup {
 
     /// What a method is told before a run.
     #[must_use]
-    pub fn briefing(&self, world: &World, home: HomeSnapshot) -> Briefing {
-        Briefing { home, robot: robot_sheet(world), task: task_sheet(&self.task(world)) }
+    pub fn briefing(&self, world: &World, sensor: &dyn Sensor) -> Briefing {
+        let camera = |home: &Panorama| CameraSheet { projection: home.projection, home_rgba: home.rgba.clone() };
+        Briefing {
+            home: sensor.home().clone(),
+            robot: robot_sheet(world),
+            task: task_sheet(&self.task(world)),
+            compass: self.compass_sd_rad.is_some(),
+            camera: sensor.home_panorama().map(camera),
+        }
     }
 
     /// The start pose in the room of the run with `seed`, checked to be free.
@@ -219,8 +226,9 @@ impl<'a> Bench<'a> {
     /// Packs the world and opens the renderer where the setup needs them.
     ///
     /// # Errors
-    /// When the world cannot be packed or the renderer cannot be had.
+    /// When the method's program is not there, the world cannot be packed or the renderer cannot be had.
     pub fn new(world: &'a World, setup: &'a Setup) -> Result<Self> {
+        setup.method.check()?;
         let camera = match setup.bearings {
             Bearings::Rendered => {
                 let scene = Scene::new(world)?;
@@ -266,9 +274,9 @@ impl<'a> Bench<'a> {
         };
         let mut sensor = self.sensor(seed)?;
         let task = setup.task(world);
-        let briefing = setup.briefing(world, sensor.home().clone());
+        let briefing = setup.briefing(world, sensor.as_ref());
         let initial = if setup.told_start { Some(world.home.to_local(&start)) } else { setup.initial_estimate };
-        let mut method = method::build(setup.method, setup.law, briefing, initial)?;
+        let mut method = method::build(setup.method.clone(), setup.law, briefing, initial)?;
         let parts = Parts { plant: plant.as_mut(), sensor: sensor.as_mut(), method: method.as_mut() };
         run(parts, world.home, &task, watch)
     }

@@ -41,6 +41,7 @@ fn title(world: &World, record: &Record) -> String {
         Outcome::Lost if record.claimed_home => "claimed to be home",
         Outcome::Lost => "lost",
         Outcome::Stuck => "stuck",
+        Outcome::Failed => "method broke",
     };
     format!(
         "{}: {outcome}, {:.1} cm from home after {:.1} s",
