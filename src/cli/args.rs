@@ -16,6 +16,7 @@ use wayhome::vision::Landmarks;
 use wayhome::world::{CameraPreset, LightPreset};
 
 use super::method_args::{MethodParser, PatienceArgs};
+use super::record_args::RecordArgs;
 
 /// Shown under every `--help`.
 const EXIT_CODES: &str = "Exit codes:
@@ -165,6 +166,8 @@ pub struct HomeArgs {
     /// Share of noisy bearings that are false [default: 0.02]
     #[arg(long, value_name = "SHARE", allow_negative_numbers = true, value_parser = share)]
     pub noise_false: Option<f64>,
+    #[command(flatten)]
+    pub recordings: RecordArgs,
     /// Folder for the results [default: results/runs/home-WORLD-SEED]
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,

@@ -7,7 +7,8 @@ use anyhow::Result;
 use serde::Serialize;
 use wayhome::Error;
 use wayhome::episode::sensor::Noise;
-use wayhome::episode::{Bearings, Bench, Look, Outcome, Setup, Summary};
+use wayhome::episode::{Bearings, Bench, Look, Outcome, Progress, Setup, Summary};
+use wayhome::report::recording::Recordings;
 use wayhome::report::{OutputFolder, run as run_report, seeds as seeds_report, text};
 use wayhome::study::seeds::{SeedEvent, SeedsSummary, run_seeds};
 use wayhome::vision::ExtractorSettings;
@@ -48,15 +49,21 @@ fn single(args: &HomeArgs, context: &Context, world: &World, setup: &Setup) -> R
     let out = args.out.clone().unwrap_or_else(|| default_folder(&["home", &world.spec.name, &seed]));
     setup.method.check()?;
     setup.start_pose(world, wayhome::random::Seed(args.seed))?; // before a folder is made for a run that cannot start
+    let paths = args.recordings.paths();
+    paths.check(&out)?;
     let folder = OutputFolder::open(&out, "home", run_report::FILES)?;
+    let mut bench = Bench::new(world, setup)?;
+    let mut recordings = Recordings::open(world, &paths)?;
     let bar = context.progress(None)?;
-    let record = Bench::new(world, setup)?.run(args.seed, &mut |progress| {
+    let mut watch = |progress: &Progress| {
         bar.set_message(format!("{:.1} s, {:.2} m from home", progress.time_s, progress.distance_m));
         bar.tick();
         if context.is_stopped() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-    })?;
+    };
+    let record = bench.run_recorded(args.seed, &mut watch, &mut recordings)?;
     bar.finish_and_clear();
     let summary = Summary::new(&record, world, setup, args.seed);
+    recordings.finish(&summary)?;
     run_report::write(folder, world, &record, &summary)?;
     let output = RunOutput { summary: &summary, out: out.display().to_string() };
     context.print(&output, || text::run(&summary, &out))?;

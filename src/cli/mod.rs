@@ -12,6 +12,7 @@ mod home;
 mod method_args;
 mod observability;
 mod physics_report;
+mod record_args;
 mod render;
 mod render_report;
 mod reproduce;

@@ -7,7 +7,8 @@ use serde::Serialize;
 
 use super::method::{self, LawKind, MethodKind};
 use super::record::Record;
-use super::run::{Parts, Progress, run};
+use super::recorder::Recorder;
+use super::run::{Parts, Progress, run_recorded};
 use super::sensor::{
     CompassSensor, Degradation, DegradedSensor, IdealSensor, Noise, NoisySensor, RenderedSensor, Sensor, Sight,
 };
@@ -258,8 +259,21 @@ impl<'a> Bench<'a> {
     /// When there is no such start, the method cannot be built from what the setup gives it, the renderer fails, or `watch`
     /// breaks.
     pub fn run(&mut self, seed: u64, watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>) -> Result<Record> {
+        self.run_recorded(seed, watch, &mut ())
+    }
+
+    /// [`Bench::run`], with a recorder that is told of every control step.
+    ///
+    /// # Errors
+    /// As [`Bench::run`], and what the recorder fails with.
+    pub fn run_recorded(
+        &mut self,
+        seed: u64,
+        watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
+        recorder: &mut dyn Recorder,
+    ) -> Result<Record> {
         let start = self.setup.start_pose(self.world, Seed(seed))?;
-        self.run_from(seed, start, watch)
+        self.run_parts(seed, start, watch, recorder)
     }
 
     /// Runs the episode of one seed from a pose in the room, whatever start the setup names.
@@ -267,6 +281,16 @@ impl<'a> Bench<'a> {
     /// # Errors
     /// As [`Bench::run`].
     pub fn run_from(&mut self, seed: u64, start: Pose, watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>) -> Result<Record> {
+        self.run_parts(seed, start, watch, &mut ())
+    }
+
+    fn run_parts(
+        &mut self,
+        seed: u64,
+        start: Pose,
+        watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
+        recorder: &mut dyn Recorder,
+    ) -> Result<Record> {
         let (world, setup, seed) = (self.world, self.setup, Seed(seed));
         let mut plant: Box<dyn Plant> = match setup.plant {
             PlantKind::Rapier => Box::new(RapierPlant::new(world, start, seed)),
@@ -278,7 +302,7 @@ impl<'a> Bench<'a> {
         let initial = if setup.told_start { Some(world.home.to_local(&start)) } else { setup.initial_estimate };
         let mut method = method::build(setup.method.clone(), setup.law, briefing, initial)?;
         let parts = Parts { plant: plant.as_mut(), sensor: sensor.as_mut(), method: method.as_mut() };
-        run(parts, world.home, &task, watch)
+        run_recorded(parts, world.home, &task, watch, recorder)
     }
 
     /// The setup's sensor for the run of one seed.

@@ -13,12 +13,14 @@ pub mod map;
 pub mod paper;
 mod path_plot;
 pub mod physics;
+pub mod recording;
 pub mod render;
 pub mod robustness;
 pub mod run;
 pub mod seeds;
 pub mod sheet;
 pub mod text;
+mod tum;
 pub mod vision;
 
 pub use folder::{GrowingFile, OutputFolder, write_atomically};
