@@ -67,6 +67,12 @@ pub enum Error {
         /// What it holds.
         found: String,
     },
+    /// A file to be written is there and of another make.
+    #[error("{} is there, and this program has not written it; choose another name", path.display())]
+    FileTaken {
+        /// The file.
+        path: PathBuf,
+    },
     /// No graphics adapter serves the renderer.
     #[error(
         "no graphics adapter for the GPU renderer ({0}); use --renderer cpu, or install a Vulkan driver (on Debian mesa-vulkan-drivers is a software one)"

@@ -5,6 +5,7 @@
 //! method cannot look at the truth.
 
 use crate::geometry::{Matrix3, Pose, Twist};
+use crate::panorama::{Picture, Projection};
 
 /// Names a landmark (a feature or an object) of the home snapshot, or one met later on the way. Stable over a run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -48,6 +49,9 @@ pub struct Observation<'a> {
     pub bearings: &'a [Bearing],
     /// Heading in the home frame as a compass tells it, rad; `None` for a robot without one.
     pub compass_rad: Option<f64>,
+    /// What the camera sees now; `None` for a robot that gets bearings without panoramas. The project's own methods go by
+    /// bearings alone.
+    pub panorama: Option<Picture<'a>>,
 }
 
 /// The robot's data sheet, as its maker would state it.
@@ -74,6 +78,23 @@ pub struct TaskSheet {
     pub arrival_radius_m: f64,
 }
 
+/// The robot's camera, and what it saw at home.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CameraSheet {
+    /// Size and projection of all panoramas.
+    pub projection: Projection,
+    /// Colours of the home panorama as in [`Picture::rgba`].
+    pub home_rgba: Vec<u8>,
+}
+
+impl CameraSheet {
+    /// The home panorama.
+    #[must_use]
+    pub fn home_picture(&self) -> Picture<'_> {
+        Picture { projection: self.projection, rgba: &self.home_rgba }
+    }
+}
+
 /// All that a method is told before the run.
 #[derive(Debug, Clone)]
 pub struct Briefing {
@@ -83,6 +104,10 @@ pub struct Briefing {
     pub robot: RobotSheet,
     /// The task.
     pub task: TaskSheet,
+    /// Whether observations come with the reading of a compass.
+    pub compass: bool,
+    /// The camera; `None` for a robot that gets bearings without panoramas.
+    pub camera: Option<CameraSheet>,
 }
 
 /// Where the robot believes that it is.
@@ -159,6 +184,8 @@ pub enum Status {
     Arrived,
     /// What it sees no longer fits what it believes, and it cannot recover.
     Lost,
+    /// It is broken: [`Method::failure`] says how.
+    Failed,
 }
 
 /// One control step's answer.
@@ -182,4 +209,9 @@ pub struct Decision {
 pub trait Method: Send {
     /// Takes one observation and returns the command to hold until the next.
     fn step(&mut self, observation: &Observation<'_>) -> Decision;
+
+    /// Why it is broken, after a step with [`Status::Failed`].
+    fn failure(&self) -> Option<&str> {
+        None
+    }
 }

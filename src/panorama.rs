@@ -6,6 +6,8 @@
 
 use std::f64::consts::TAU;
 
+use image::codecs::png::{CompressionType, FilterType, PngEncoder};
+use image::{ExtendedColorType, ImageEncoder};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -150,10 +152,44 @@ impl Panorama {
         Ok(())
     }
 
+    /// Its colours alone.
+    #[must_use]
+    pub fn picture(&self) -> Picture<'_> {
+        Picture { projection: self.projection, rgba: &self.rgba }
+    }
+
     /// Luma of every pixel (BT.601 weights), row-major, 0 to 255.
     #[must_use]
     pub fn luma(&self) -> Vec<f32> {
         self.rgba.chunks_exact(4).map(|p| 0.299 * f32::from(p[0]) + 0.587 * f32::from(p[1]) + 0.114 * f32::from(p[2])).collect()
+    }
+}
+
+/// The colours of a panorama, without the ranges and instance ids that a rendered one has.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Picture<'a> {
+    /// Size and projection.
+    pub projection: Projection,
+    /// Colours, row-major from the top, 4 bytes a pixel (red, green, blue, 255).
+    pub rgba: &'a [u8],
+}
+
+impl Picture<'_> {
+    /// Its colours, 3 bytes a pixel.
+    #[must_use]
+    pub fn rgb(&self) -> Vec<u8> {
+        self.rgba.chunks_exact(4).flat_map(|p| [p[0], p[1], p[2]]).collect()
+    }
+
+    /// As a PNG file, 8 bits a channel, by the fast compression: the better one takes twenty times as long for a tenth less.
+    ///
+    /// # Errors
+    /// When it cannot be encoded.
+    pub fn png(&self) -> image::ImageResult<Vec<u8>> {
+        let mut bytes = Vec::new();
+        let encoder = PngEncoder::new_with_quality(&mut bytes, CompressionType::Fast, FilterType::Adaptive);
+        encoder.write_image(&self.rgb(), self.projection.width, self.projection.height, ExtendedColorType::Rgb8)?;
+        Ok(bytes)
     }
 }
 

@@ -123,8 +123,10 @@ fn trial(setting: &Setting, seed: u64) -> Trial {
         home,
         robot: RobotSheet { track_m: 0.23, max_speed_m_s: speed, max_turn_rate_rad_s: 1.9, max_acceleration_m_s2: 0.9 },
         task: TaskSheet { speed_m_s: speed, control_period_s: period, arrival_radius_m: radius },
+        compass: false,
+        camera: None,
     };
-    let mut method = build(setting.method, setting.law, briefing, None).unwrap();
+    let mut method = build(setting.method.clone(), setting.law, briefing, None).unwrap();
     let filter_settings = FilterSettings { track_m: 0.23, ..FilterSettings::default() };
     let mut slip = SlipWatch::default();
     let mut odometry = Odometry::default();
@@ -133,7 +135,8 @@ fn trial(setting: &Setting, seed: u64) -> Trial {
     let mut arrived = false;
     while time < 90.0 {
         let bearings = see(&truth, &mut noise);
-        let decision = method.step(&Observation { time_s: time, odometry, bearings: &bearings, compass_rad: None });
+        let decision =
+            method.step(&Observation { time_s: time, odometry, bearings: &bearings, compass_rad: None, panorama: None });
         if let Some(estimate) = &decision.estimate {
             assert!(estimate.pose.is_finite());
             errors.push(nees(estimate, &truth));

@@ -15,6 +15,9 @@ use wayhome::study::vision::conditions::Axis as VisionAxis;
 use wayhome::vision::Landmarks;
 use wayhome::world::{CameraPreset, LightPreset};
 
+use super::method_args::{MethodParser, PatienceArgs};
+use super::record_args::RecordArgs;
+
 /// Shown under every `--help`.
 const EXIT_CODES: &str = "Exit codes:
   0    done; for a single run of `home`: home was reached
@@ -115,11 +118,13 @@ pub struct HomeArgs {
     #[arg(long, default_value = "rendered", value_parser = choice(BEARINGS))]
     pub bearings: Bearings,
     /// Homing method
-    #[arg(long, default_value = "anchored-ekf", value_parser = choice(METHODS))]
+    #[arg(long, default_value = "anchored-ekf", value_parser = MethodParser)]
     pub method: MethodKind,
     /// Steering law of the methods that estimate where home is
     #[arg(long, default_value = "proportional", value_parser = choice(LAWS))]
     pub controller: LawKind,
+    #[command(flatten)]
+    pub patience: PatienceArgs,
     /// What a landmark of rendered bearings is [default: features]
     #[arg(long, value_parser = choice(LANDMARKS))]
     pub landmarks: Option<Landmarks>,
@@ -154,7 +159,7 @@ pub struct HomeArgs {
     /// Pose in the home frame at which a filter starts that has to be given one (paper-ekf): x,y,heading_deg
     #[arg(long, value_name = "x,y,heading_deg", allow_hyphen_values = true, value_parser = pose)]
     pub initial_estimate: Option<Pose>,
-    /// Give the robot a compass with readings of this standard deviation, degrees; methods without an estimate use it
+    /// Give the robot a compass with readings of this standard deviation, degrees; programs and methods without an estimate use it
     #[arg(long, value_name = "DEG", allow_negative_numbers = true, value_parser = not_negative)]
     pub compass_deg: Option<f64>,
     /// Time limit, s [default: the world's]
@@ -169,6 +174,8 @@ pub struct HomeArgs {
     /// Share of noisy bearings that are false [default: 0.02]
     #[arg(long, value_name = "SHARE", allow_negative_numbers = true, value_parser = share)]
     pub noise_false: Option<f64>,
+    #[command(flatten)]
+    pub recordings: RecordArgs,
     /// Folder for the results [default: results/runs/home-WORLD-SEED]
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
@@ -227,11 +234,13 @@ pub struct RobustnessArgs {
     #[arg(long, default_value = "rendered", value_parser = choice(BEARINGS))]
     pub bearings: Bearings,
     /// Homing method
-    #[arg(long, default_value = "anchored-ekf", value_parser = choice(METHODS))]
+    #[arg(long, default_value = "anchored-ekf", value_parser = MethodParser)]
     pub method: MethodKind,
     /// Steering law of the methods that estimate where home is
     #[arg(long, default_value = "proportional", value_parser = choice(LAWS))]
     pub controller: LawKind,
+    #[command(flatten)]
+    pub patience: PatienceArgs,
     /// What renders
     #[arg(long, default_value = "auto", value_parser = choice(RENDERERS))]
     pub renderer: RendererChoice,
@@ -392,15 +401,6 @@ pub const BEARINGS: &[Choice<Bearings>] = &[
     (Bearings::Noisy, "noisy", "Ideal bearings with noise, drop-outs and false matches"),
 ];
 
-const METHODS: &[Choice<MethodKind>] = &[
-    (MethodKind::AnchoredEkf, "anchored-ekf", "Filter that starts from nothing and anchors home when it can"),
-    (MethodKind::PaperEkf, "paper-ekf", "The paper's filter on three landmarks, started at a supposed pose"),
-    (MethodKind::Alv, "alv", "Average landmark vector; no estimate"),
-    (MethodKind::TronDaniilidis, "tron-daniilidis", "Tron and Daniilidis' descent on bearings; no estimate"),
-    (MethodKind::Weber, "weber", "Weber's bearing vectors; no estimate"),
-    (MethodKind::Ibvs, "ibvs", "Visual servoing with one constant range; no estimate"),
-];
-
 const LAWS: &[Choice<LawKind>] = &[
     (LawKind::Proportional, "proportional", "Turn rate proportional to the heading error"),
     (LawKind::Lyapunov, "lyapunov", "The paper's switching law"),
@@ -479,11 +479,6 @@ pub fn name_of<T: PartialEq>(choices: &[Choice<T>], wanted: &T) -> &'static str 
 /// What `--bearings` calls a sensor.
 pub fn bearings_name(bearings: Bearings) -> &'static str {
     name_of(BEARINGS, &bearings)
-}
-
-/// What `--method` calls a method.
-pub fn method_name(method: MethodKind) -> &'static str {
-    name_of(METHODS, &method)
 }
 
 /// What `--controller` calls a law.
@@ -590,7 +585,6 @@ mod tests {
         }
         check(PLANTS);
         check(BEARINGS);
-        check(METHODS);
         check(LAWS);
         check(AXES);
         check(LANDMARKS);

@@ -5,16 +5,18 @@ use std::path::PathBuf;
 
 use anyhow::Result;
 use serde::Serialize;
+use wayhome::episode::method::exec::ExecCommand;
 use wayhome::episode::{Bearings, PlantKind, Setup};
 use wayhome::render::RendererChoice;
 use wayhome::report::{OutputFolder, compare as report};
-use wayhome::study::compare::{Comparison, compare, pick, runs};
+use wayhome::study::compare::{Comparison, Contender, compare, pick, runs};
 use wayhome::world::World;
 
 use super::Verdict;
-use super::args::{BEARINGS, PLANTS, RENDERERS, bearings_name, choice, name_of, not_negative, positive, seeds, size};
+use super::args::{BEARINGS, PLANTS, RENDERERS, bearings_name, choice, name_of, not_negative, positive, quoted, seeds, size};
 use super::context::{Context, default_folder};
 use super::home::needs_bearings;
+use super::method_args::{PatienceArgs, program};
 
 /// Arguments of `compare`.
 #[derive(Debug, clap::Args)]
@@ -37,9 +39,14 @@ pub struct CompareArgs {
     /// Contenders; several are separated by commas [default: all]
     #[arg(long, value_name = "NAME", value_delimiter = ',')]
     pub contenders: Vec<String>,
-    /// Standard deviation of the compass of those that have one, degrees
-    #[arg(long, value_name = "DEG", default_value_t = 0.0, allow_negative_numbers = true, value_parser = not_negative)]
-    pub compass_deg: f64,
+    /// A program as one more contender, such as exec:"python3 my_method.py"; may be given several times
+    #[arg(long, value_name = "exec:COMMAND", value_parser = program)]
+    pub method: Vec<ExecCommand>,
+    #[command(flatten)]
+    pub patience: PatienceArgs,
+    /// Standard deviation of the compass of those that have one, degrees; programs have one if this is given [default: 0]
+    #[arg(long, value_name = "DEG", allow_negative_numbers = true, value_parser = not_negative)]
+    pub compass_deg: Option<f64>,
     /// What renders
     #[arg(long, default_value = "auto", value_parser = choice(RENDERERS))]
     pub renderer: RendererChoice,
@@ -64,14 +71,19 @@ struct Output<'a> {
 
 pub fn run(args: &CompareArgs, context: &Context) -> Result<Verdict> {
     needs_bearings(args.size.is_some(), "--size", args.bearings, Bearings::Rendered)?;
-    let contenders = pick(&args.contenders)?;
+    let mut contenders = pick(&args.contenders)?;
+    for (number, command) in (1..).zip(&args.method) {
+        command.check()?;
+        let command = command.clone().with_time_limit(args.patience.method_timeout_s);
+        contenders.push(Contender::program(number, command, args.compass_deg.is_some()));
+    }
     let world = World::open(&args.world)?;
     let setup = Setup {
         plant: args.plant,
         bearings: args.bearings,
         renderer: args.renderer,
         size_px: args.size,
-        compass_sd_rad: Some(args.compass_deg.to_radians()),
+        compass_sd_rad: Some(args.compass_deg.unwrap_or(0.0).to_radians()),
         time_limit_s: args.time_limit_s,
         ..Setup::default()
     };
@@ -82,7 +94,7 @@ pub fn run(args: &CompareArgs, context: &Context) -> Result<Verdict> {
     let bar = context.progress(Some(runs(&world, contenders.len(), &args.seeds, places)))?;
     bar.tick();
     let comparison = compare(&world, &setup, &contenders, &args.seeds, places, rayon::current_num_threads(), &|contender| {
-        bar.set_message(contender.key);
+        bar.set_message(contender.key.to_string());
         bar.inc(1);
         if context.is_stopped() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     })?;
@@ -104,8 +116,12 @@ fn command(args: &CompareArgs) -> String {
     if !args.contenders.is_empty() {
         flag("contenders", args.contenders.join(","));
     }
-    if args.compass_deg > 0.0 {
-        flag("compass-deg", args.compass_deg.to_string());
+    for command in &args.method {
+        flag("method", quoted(&format!("exec:{command}")));
+    }
+    // It matters for a program whether there is one; for the others only how good it is.
+    if let Some(compass_deg) = args.compass_deg.filter(|deg| *deg > 0.0 || !args.method.is_empty()) {
+        flag("compass-deg", compass_deg.to_string());
     }
     if args.bearings == Bearings::Rendered {
         flag("renderer", name_of(RENDERERS, &args.renderer).to_owned());

@@ -36,7 +36,10 @@ impl Context {
         let flag = Arc::clone(&stopped);
         // The first asks the run to end at its next step; who insists gets out at once, as files are written whole.
         ctrlc::set_handler(move || {
-            if flag.swap(true, Ordering::Relaxed) {
+            let insists = flag.swap(true, Ordering::Relaxed);
+            // Nobody waits for a program under test any longer, and none stays behind.
+            wayhome::episode::method::exec::end_all();
+            if insists {
                 std::process::exit(INTERRUPTED);
             }
         })

@@ -8,7 +8,8 @@ use anyhow::{Result, bail};
 use serde::Serialize;
 use wayhome::Error;
 use wayhome::episode::sensor::Noise;
-use wayhome::episode::{Bearings, Bench, Look, Outcome, Setup, Summary};
+use wayhome::episode::{Bearings, Bench, Look, Outcome, Progress, Setup, Summary};
+use wayhome::report::recording::Recordings;
 use wayhome::report::sweep::StudyFolder;
 use wayhome::report::{OutputFolder, run as run_report, seeds as seeds_report, text};
 use wayhome::study::seeds::{SeedEvent, SeedsSummary, run_seeds};
@@ -48,7 +49,7 @@ pub fn run(args: &HomeArgs, context: &Context) -> Result<Verdict> {
         None => {
             let out = args.out.clone();
             let out = out.unwrap_or_else(|| default_folder(&["home", &world.spec.name, &args.seed.to_string()]));
-            Ok(verdict(&single(context, &world, &setup, args.seed, &out)?))
+            Ok(verdict(&single(args, context, &world, &setup, args.seed, &out)?))
         }
     }
 }
@@ -61,7 +62,7 @@ fn replay(args: &HomeArgs, context: &Context, folder: &Path, episode: u64) -> Re
     let (world, setup) = study.case(&row.values)?;
     let out = args.out.clone();
     let out = out.unwrap_or_else(|| default_folder(&["home", &study.name, &episode.to_string()]));
-    let summary = single(context, &world, &setup, row.seed, &out)?;
+    let summary = single(args, context, &world, &setup, row.seed, &out)?;
     let again = Row::of(episode, row.cell, &row.values, &summary);
     if again != row {
         bail!("episode {episode} of {} did not run as its row says: another machine or build made it", folder.display());
@@ -73,17 +74,24 @@ fn verdict(summary: &Summary) -> Verdict {
     if summary.outcome == Outcome::Home { Verdict::Done } else { Verdict::NotHome }
 }
 
-fn single(context: &Context, world: &World, setup: &Setup, seed: u64, out: &Path) -> Result<Summary> {
+fn single(args: &HomeArgs, context: &Context, world: &World, setup: &Setup, seed: u64, out: &Path) -> Result<Summary> {
+    setup.method.check()?;
     setup.start_pose(world, wayhome::random::Seed(seed))?; // before a folder is made for a run that cannot start
+    let paths = args.recordings.paths();
+    paths.check(out)?;
     let folder = OutputFolder::open(out, "home", run_report::FILES)?;
+    let mut bench = Bench::new(world, setup)?;
+    let mut recordings = Recordings::open(world, &paths)?;
     let bar = context.progress(None)?;
-    let record = Bench::new(world, setup)?.run(seed, &mut |progress| {
+    let mut watch = |progress: &Progress| {
         bar.set_message(format!("{:.1} s, {:.2} m from home", progress.time_s, progress.distance_m));
         bar.tick();
         if context.is_stopped() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-    })?;
+    };
+    let record = bench.run_recorded(seed, &mut watch, &mut recordings)?;
     bar.finish_and_clear();
     let summary = Summary::new(&record, world, setup, seed);
+    recordings.finish(&summary)?;
     run_report::write(folder, world, &record, &summary)?;
     let output = RunOutput { summary: &summary, out: out.display().to_string() };
     context.print(&output, || text::run(&summary, out))?;
@@ -93,6 +101,7 @@ fn single(context: &Context, world: &World, setup: &Setup, seed: u64, out: &Path
 fn batch(args: &HomeArgs, context: &Context, world: &World, setup: &Setup, seeds: &RangeInclusive<u64>) -> Result<Verdict> {
     let range = format!("{}..{}", seeds.start(), seeds.end());
     let out = args.out.clone().unwrap_or_else(|| default_folder(&["home", &world.spec.name, &range]));
+    setup.method.check()?;
     let folder = OutputFolder::open(&out, "home --seeds", seeds_report::FILES)?;
     let bar = context.progress(Some(seeds.end() - seeds.start() + 1))?;
     bar.tick();
@@ -130,7 +139,7 @@ fn setup(args: &HomeArgs) -> Result<Setup, Error> {
     Ok(Setup {
         plant: args.plant,
         bearings: args.bearings,
-        method: args.method,
+        method: args.patience.method(&args.method),
         law: args.controller,
         renderer: args.renderer,
         size_px: args.size,

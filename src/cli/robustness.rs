@@ -11,7 +11,7 @@ use wayhome::study::seeds::SeedEvent;
 use wayhome::world::World;
 
 use super::Verdict;
-use super::args::{RobustnessArgs, bearings_name, law_name, method_name, quoted, renderer_name};
+use super::args::{RobustnessArgs, bearings_name, law_name, quoted, renderer_name};
 use super::context::{Context, default_folder};
 use super::home::needs_bearings;
 
@@ -28,13 +28,14 @@ pub fn run(args: &RobustnessArgs, context: &Context) -> Result<Verdict> {
     let world = World::open(&args.world)?;
     let setup = Setup {
         bearings: args.bearings,
-        method: args.method,
+        method: args.patience.method(&args.method),
         law: args.controller,
         renderer: args.renderer,
         size_px: args.size,
         time_limit_s: args.time_limit_s,
         ..Setup::default()
     };
+    setup.method.check()?;
     let axes = axes(args);
     let range = format!("{}..{}", args.seeds.start(), args.seeds.end());
     let out = args.out.clone().unwrap_or_else(|| default_folder(&["robustness", &world.spec.name, &range]));
@@ -70,7 +71,7 @@ fn command(args: &RobustnessArgs) -> String {
         flag("axis", axes(args).iter().map(|a| a.name()).collect::<Vec<_>>().join(","));
     }
     flag("bearings", bearings_name(args.bearings).to_owned());
-    flag("method", method_name(args.method).to_owned());
+    flag("method", quoted(&args.method.to_string()));
     flag("controller", law_name(args.controller).to_owned());
     flag("renderer", renderer_name(args.renderer).to_owned());
     if let Some((width, height)) = args.size {

@@ -3,10 +3,14 @@
 //! Everything here sees a [`Briefing`] and [`Observation`]s only. The one number a person may add is `initial`, the pose that
 //! the paper's filter is started from, because that filter cannot start from nothing.
 
+pub mod exec;
 mod paper;
 mod vector;
 
-use serde::Serialize;
+use std::fmt;
+use std::str::FromStr;
+
+use serde::{Serialize, Serializer};
 
 use crate::control::escape::Escape;
 use crate::control::vectors::VectorLaw;
@@ -15,12 +19,12 @@ use crate::error::{Error, Result};
 use crate::estimation::anchored::{AnchoredFilter, FilterSettings};
 use crate::geometry::{Pose, Twist, wrap};
 use crate::observation::{Briefing, Decision, Estimate, Method, Observation, Status};
+use exec::{ExecCommand, ExecHoming};
 use paper::PaperHoming;
 use vector::VectorHoming;
 
-/// Homing methods by name.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "kebab-case")]
+/// Homing methods by name. A method is read from its name and shown by it: `alv`, or `exec:python3 my_method.py`.
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub enum MethodKind {
     /// The anchored filter: nothing known at the start.
     AnchoredEkf,
@@ -34,13 +38,78 @@ pub enum MethodKind {
     Weber,
     /// Visual servoing with one constant range, aligned like it.
     Ibvs,
+    /// A program of the user's own.
+    Exec(ExecCommand),
 }
 
 impl MethodKind {
-    /// Whether the method steers by a homing vector and has no estimate; a compass serves these alone.
+    /// The methods that the project brings.
+    pub const BUILT_IN: [Self; 6] =
+        [Self::AnchoredEkf, Self::PaperEkf, Self::Alv, Self::TronDaniilidis, Self::Weber, Self::Ibvs];
+
+    /// Name without what belongs to one program.
     #[must_use]
-    pub fn is_vector(self) -> bool {
-        !matches!(self, Self::AnchoredEkf | Self::PaperEkf)
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::AnchoredEkf => "anchored-ekf",
+            Self::PaperEkf => "paper-ekf",
+            Self::Alv => "alv",
+            Self::TronDaniilidis => "tron-daniilidis",
+            Self::Weber => "weber",
+            Self::Ibvs => "ibvs",
+            Self::Exec(_) => "exec",
+        }
+    }
+
+    /// Fewest landmarks in the home snapshot that the method can do with.
+    #[must_use]
+    pub fn fewest_landmarks(&self) -> usize {
+        match self {
+            Self::AnchoredEkf | Self::PaperEkf => 3,
+            Self::Alv | Self::TronDaniilidis | Self::Weber | Self::Ibvs => 2,
+            Self::Exec(_) => 0,
+        }
+    }
+
+    /// Checks what can be checked before a run: that a program is there.
+    ///
+    /// # Errors
+    /// When it is not.
+    pub fn check(&self) -> Result<()> {
+        match self {
+            Self::Exec(command) => command.check(),
+            _ => Ok(()),
+        }
+    }
+}
+
+impl fmt::Display for MethodKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Exec(command) => write!(f, "{}{command}", exec::PREFIX),
+            own => f.write_str(own.name()),
+        }
+    }
+}
+
+impl FromStr for MethodKind {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self> {
+        if let Some(command) = text.strip_prefix(exec::PREFIX) {
+            return ExecCommand::parse(command).map(Self::Exec);
+        }
+        Self::BUILT_IN.into_iter().find(|kind| kind.name() == text).ok_or_else(|| Error::Invalid {
+            what: "method".into(),
+            found: format!("`{text}`"),
+            allowed: format!("{}, {}COMMAND", Self::BUILT_IN.map(|kind| kind.name()).join(", "), exec::PREFIX),
+        })
+    }
+}
+
+impl Serialize for MethodKind {
+    fn serialize<S: Serializer>(&self, serializer: S) -> std::result::Result<S::Ok, S::Error> {
+        serializer.collect_str(self)
     }
 }
 
@@ -77,7 +146,7 @@ pub fn build(
             allowed: "none: only paper-ekf is started from a supposed pose".into(),
         });
     }
-    let least = if kind.is_vector() { 2 } else { 3 };
+    let least = kind.fewest_landmarks();
     if briefing.home.bearings.len() < least {
         return Err(Error::Invalid {
             what: "landmarks in the home snapshot".into(),
@@ -93,6 +162,7 @@ pub fn build(
         MethodKind::TronDaniilidis => vector(VectorLaw::TronDaniilidis, briefing),
         MethodKind::Weber => vector(VectorLaw::Weber, briefing),
         MethodKind::Ibvs => vector(VectorLaw::Ibvs, briefing),
+        MethodKind::Exec(command) => Box::new(ExecHoming::new(command, briefing)),
     })
 }
 

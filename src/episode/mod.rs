@@ -12,13 +12,15 @@
 pub mod method;
 pub mod open_loop;
 mod record;
+mod recorder;
 mod run;
 pub mod sensor;
 mod setup;
 mod summary;
 
 pub use record::{Belief, Outcome, Pictures, Record, Step, Timing};
-pub use run::{Parts, Progress, run};
+pub use recorder::{Moment, Recorder};
+pub use run::{Parts, Progress, run, run_recorded};
 pub use sensor::Sensor;
 pub use setup::{Bearings, Bench, Look, PlantKind, Setup, Start};
 pub use summary::{BeliefError, CollisionRecord, EstimateErrors, Landmarks, PoseRecord, SetupRecord, Summary};

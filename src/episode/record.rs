@@ -20,11 +20,13 @@ pub enum Outcome {
     Lost,
     /// The robot did not move although it was told to.
     Stuck,
+    /// The method broke: a program under test that ended, took too long or answered nonsense.
+    Failed,
 }
 
 impl Outcome {
     /// All outcomes, in the order in which tables list them.
-    pub const ALL: [Self; 4] = [Self::Home, Self::Timeout, Self::Lost, Self::Stuck];
+    pub const ALL: [Self; 5] = [Self::Home, Self::Timeout, Self::Lost, Self::Stuck, Self::Failed];
 
     /// Lower-case name, as files have it.
     #[must_use]
@@ -34,6 +36,7 @@ impl Outcome {
             Self::Timeout => "timeout",
             Self::Lost => "lost",
             Self::Stuck => "stuck",
+            Self::Failed => "failed",
         }
     }
 }
@@ -141,6 +144,8 @@ pub struct Record {
     pub outcome: Outcome,
     /// Whether the method claimed to be home, rightly or not.
     pub claimed_home: bool,
+    /// Why the method broke, where it did.
+    pub failure: Option<String>,
     /// Time at which the run ended: the method stopped, or was stopped, s.
     pub time_s: f64,
     /// Control steps, first to last. The rows after `time_s` are the robot coming to rest.

@@ -4,10 +4,12 @@ use std::ops::ControlFlow;
 use std::time::Instant;
 
 use super::record::{Outcome, Pictures, Record, Step, Timing};
+use super::recorder::{Moment, Recorder};
 use super::sensor::Sensor;
 use crate::error::{Error, Result};
 use crate::geometry::{Pose, Twist, wrap};
-use crate::observation::{Estimate, Method, Observation, Odometry, Status};
+use crate::observation::{Bearing, Estimate, Method, Observation, Odometry, Status};
+use crate::panorama::Panorama;
 use crate::physics::{Collision, Plant};
 use crate::world::TaskSpec;
 
@@ -59,6 +61,21 @@ pub fn run(
     task: &TaskSpec,
     watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
 ) -> Result<Record> {
+    run_recorded(parts, home, task, watch, &mut ())
+}
+
+/// [`run`], with a recorder that is told of every control step. The record is the same with any recorder, but for its timing.
+///
+/// # Errors
+/// As [`run`], and what the recorder fails with.
+pub fn run_recorded(
+    parts: Parts<'_>,
+    home: Pose,
+    task: &TaskSpec,
+    watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
+    recorder: &mut dyn Recorder,
+) -> Result<Record> {
+    recorder.begin(parts.sensor.home(), parts.sensor.home_panorama())?;
     let mut timing = Timing::default();
     let began = Instant::now();
     let mut drive = Drive::new(parts.plant, task.control_period_s);
@@ -71,7 +88,8 @@ pub fn run(
         let bearings = parts.sensor.observe(truth, drive.plant.body_poses())?;
         let deciding = Instant::now();
         let compass_rad = parts.sensor.compass_rad(truth);
-        let seen = Observation { time_s, odometry: drive.odometry, bearings: &bearings, compass_rad };
+        let panorama = parts.sensor.panorama().map(Panorama::picture);
+        let seen = Observation { time_s, odometry: drive.odometry, bearings: &bearings, compass_rad, panorama };
         let decision = parts.method.step(&seen);
         timing.estimation_s += deciding.elapsed().as_secs_f64();
         if steps.is_empty() {
@@ -86,6 +104,10 @@ pub fn run(
             nis: decision.nis,
             ..drive.row(time_s)
         });
+        if let Some(step) = steps.last() {
+            let panorama = parts.sensor.panorama();
+            recorder.record(&drive.moment(step, &bearings, panorama))?;
+        }
         let distance_m = (truth.position() - home.position()).norm();
         if watch(&Progress { time_s, distance_m, estimate: decision.estimate }).is_break() {
             return Err(Error::Interrupted);
@@ -93,6 +115,7 @@ pub fn run(
         match decision.status {
             Status::Arrived => break (Ending::Claimed, time_s),
             Status::Lost => break (Ending::GaveUp, time_s),
+            Status::Failed => break (Ending::Broke, time_s),
             Status::Running if time_s >= task.time_limit_s => break (Ending::Timeout, time_s),
             Status::Running if is_stuck(&steps, task.control_period_s) => break (Ending::Stuck, time_s),
             Status::Running => {}
@@ -105,10 +128,11 @@ pub fn run(
     };
     pictures.end = parts.sensor.panorama().cloned();
 
-    drive.come_to_rest(&mut steps);
+    drive.come_to_rest(&mut steps, recorder)?;
     let mut record = Record {
         outcome: Outcome::Lost,
         claimed_home: ending == Ending::Claimed,
+        failure: parts.method.failure().map(str::to_owned),
         time_s,
         collisions: drive.collisions,
         home,
@@ -123,6 +147,7 @@ pub fn run(
         Ending::Claimed | Ending::GaveUp => Outcome::Lost,
         Ending::Timeout => Outcome::Timeout,
         Ending::Stuck => Outcome::Stuck,
+        Ending::Broke => Outcome::Failed,
     };
     let sensing = parts.sensor.timing();
     let wall_s = began.elapsed().as_secs_f64();
@@ -144,6 +169,7 @@ enum Ending {
     GaveUp,
     Timeout,
     Stuck,
+    Broke,
 }
 
 /// The plant with what it reported since the last step.
@@ -154,6 +180,8 @@ struct Drive<'a> {
     slip_m_s: [f64; 2],
     dead_reckoned: Pose,
     collisions: Vec<Collision>,
+    /// How many of these there were before the last step.
+    known_collisions: usize,
     physics_s: f64,
 }
 
@@ -167,6 +195,7 @@ impl<'a> Drive<'a> {
             slip_m_s: [0.0; 2],
             dead_reckoned,
             collisions: Vec::new(),
+            known_collisions: 0,
             physics_s: 0.0,
         }
     }
@@ -178,6 +207,7 @@ impl<'a> Drive<'a> {
         self.physics_s += moving.elapsed().as_secs_f64();
         self.odometry = moved.odometry;
         self.slip_m_s = moved.slip_m_s;
+        self.known_collisions = self.collisions.len();
         self.collisions.extend_from_slice(self.plant.collisions());
         self.dead_reckoned = self.dead_reckoned.advanced(moved.odometry.twist, moved.odometry.dt_s);
     }
@@ -199,13 +229,20 @@ impl<'a> Drive<'a> {
         }
     }
 
+    /// What a recorder is told of a step.
+    fn moment<'m>(&'m self, step: &'m Step, bearings: &'m [Bearing], panorama: Option<&'m Panorama>) -> Moment<'m> {
+        let collisions = &self.collisions[self.known_collisions..];
+        Moment { step, bearings, panorama, bodies: self.plant.body_poses(), collisions }
+    }
+
     /// Commands zero until the robot rests, one row a period.
-    fn come_to_rest(&mut self, steps: &mut Vec<Step>) {
+    fn come_to_rest(&mut self, steps: &mut Vec<Step>, recorder: &mut dyn Recorder) -> Result<()> {
         let limit = (REST_LIMIT_S / self.period_s).ceil() as usize;
         for _ in 0..limit {
             let before = self.plant.truth();
             self.step(Twist::default());
             let row = self.row(steps.len() as f64 * self.period_s);
+            recorder.record(&self.moment(&row, &[], None))?;
             steps.push(row);
             let moved = (row.truth.position() - before.position()).norm();
             let turned = wrap(row.truth.heading - before.heading).abs();
@@ -213,6 +250,7 @@ impl<'a> Drive<'a> {
                 break;
             }
         }
+        Ok(())
     }
 }
 
@@ -231,7 +269,7 @@ fn is_stuck(steps: &[Step], period_s: f64) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::observation::{Bearing, Decision, HomeSnapshot};
+    use crate::observation::{Decision, HomeSnapshot};
     use crate::physics::PlantStep;
 
     /// Moves as told along a line, short of a wall; coasts for one period after the command ends.

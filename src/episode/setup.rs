@@ -7,15 +7,16 @@ use serde::Serialize;
 
 use super::method::{self, LawKind, MethodKind};
 use super::record::Record;
-use super::run::{Parts, Progress, run};
+use super::recorder::Recorder;
+use super::run::{Parts, Progress, run_recorded};
 use super::sensor::{
     CompassSensor, Degradation, DegradedSensor, IdealSensor, Noise, NoisySensor, RenderedSensor, Sensor, Sight,
 };
 use crate::error::{Error, Result};
 use crate::estimation::anchored::FilterSettings;
 use crate::geometry::Pose;
-use crate::observation::{Briefing, HomeSnapshot, RobotSheet, TaskSheet};
-use crate::panorama::Projection;
+use crate::observation::{Briefing, CameraSheet, RobotSheet, TaskSheet};
+use crate::panorama::{Panorama, Projection};
 use crate::physics::{Plant, RapierPlant, UnicyclePlant};
 use crate::random::Seed;
 use crate::render::{self, Renderer, RendererChoice, Scene};
@@ -123,8 +124,8 @@ pub struct Setup {
     pub noise: Noise,
     /// What is done to the bearings of any sensor on top of that.
     pub degradation: Degradation,
-    /// Standard deviation of the readings of the robot's compass, rad; `None` for a robot without one. Only methods that steer
-    /// by a homing vector read it.
+    /// Standard deviation of the readings of the robot's compass, rad; `None` for a robot without one. Methods that
+    /// estimate where home is leave it alone.
     pub compass_sd_rad: Option<f64>,
     /// Where runs start.
     pub start: Start,
@@ -182,8 +183,15 @@ impl Setup {
 
     /// What a method is told before a run.
     #[must_use]
-    pub fn briefing(&self, world: &World, home: HomeSnapshot) -> Briefing {
-        Briefing { home, robot: robot_sheet(world), task: task_sheet(&self.task(world)) }
+    pub fn briefing(&self, world: &World, sensor: &dyn Sensor) -> Briefing {
+        let camera = |home: &Panorama| CameraSheet { projection: home.projection, home_rgba: home.rgba.clone() };
+        Briefing {
+            home: sensor.home().clone(),
+            robot: robot_sheet(world),
+            task: task_sheet(&self.task(world)),
+            compass: self.compass_sd_rad.is_some(),
+            camera: sensor.home_panorama().map(camera),
+        }
     }
 
     /// The start pose in the room of the run with `seed`, checked to be free.
@@ -223,8 +231,9 @@ impl<'a> Bench<'a> {
     /// Packs the world and opens the renderer where the setup needs them.
     ///
     /// # Errors
-    /// When the world cannot be packed or the renderer cannot be had.
+    /// When the method's program is not there, the world cannot be packed or the renderer cannot be had.
     pub fn new(world: &'a World, setup: &'a Setup) -> Result<Self> {
+        setup.method.check()?;
         let camera = match setup.bearings {
             Bearings::Rendered => {
                 let scene = Scene::new(world)?;
@@ -273,8 +282,21 @@ impl<'a> Bench<'a> {
     /// When there is no such start, the method cannot be built from what the setup gives it, the renderer fails, or `watch`
     /// breaks.
     pub fn run(&mut self, seed: u64, watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>) -> Result<Record> {
+        self.run_recorded(seed, watch, &mut ())
+    }
+
+    /// [`Bench::run`], with a recorder that is told of every control step.
+    ///
+    /// # Errors
+    /// As [`Bench::run`], and what the recorder fails with.
+    pub fn run_recorded(
+        &mut self,
+        seed: u64,
+        watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
+        recorder: &mut dyn Recorder,
+    ) -> Result<Record> {
         let start = self.setup.start_pose(self.world, Seed(seed))?;
-        self.run_from(seed, start, watch)
+        self.run_parts(seed, start, watch, recorder)
     }
 
     /// Runs the episode of one seed from a pose in the room, whatever start the setup names.
@@ -282,6 +304,16 @@ impl<'a> Bench<'a> {
     /// # Errors
     /// As [`Bench::run`].
     pub fn run_from(&mut self, seed: u64, start: Pose, watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>) -> Result<Record> {
+        self.run_parts(seed, start, watch, &mut ())
+    }
+
+    fn run_parts(
+        &mut self,
+        seed: u64,
+        start: Pose,
+        watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
+        recorder: &mut dyn Recorder,
+    ) -> Result<Record> {
         let (world, setup, seed) = (self.world, self.setup, Seed(seed));
         let mut plant: Box<dyn Plant> = match setup.plant {
             PlantKind::Rapier => Box::new(RapierPlant::new(world, start, seed)),
@@ -289,11 +321,11 @@ impl<'a> Bench<'a> {
         };
         let mut sensor = self.sensor(seed)?;
         let task = setup.task(world);
-        let briefing = setup.briefing(world, sensor.home().clone());
+        let briefing = setup.briefing(world, sensor.as_ref());
         let initial = if setup.told_start { Some(world.home.to_local(&start)) } else { setup.initial_estimate };
-        let mut method = method::build(setup.method, setup.law, setup.filter, briefing, initial)?;
+        let mut method = method::build(setup.method.clone(), setup.law, setup.filter, briefing, initial)?;
         let parts = Parts { plant: plant.as_mut(), sensor: sensor.as_mut(), method: method.as_mut() };
-        run(parts, world.home, &task, watch)
+        run_recorded(parts, world.home, &task, watch, recorder)
     }
 
     /// The setup's sensor for the run of one seed.

@@ -20,6 +20,9 @@ pub struct Summary {
     pub outcome: Outcome,
     /// Whether the method claimed to be home; with an outcome other than "home" the claim was wrong.
     pub claimed_home: bool,
+    /// Why the method broke; left out where it did not.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub failure: Option<String>,
     /// True distance from the robot at rest to home, m.
     pub final_distance_m: f64,
     /// Difference between the robot's heading at rest and home's, rad.
@@ -141,7 +144,7 @@ impl SetupRecord {
         Self {
             plant: setup.plant,
             bearings: setup.bearings,
-            method: setup.method,
+            method: setup.method.clone(),
             controller: setup.law,
             compass_sd_rad: setup.compass_sd_rad,
             size_px: rendered.then_some([projection.width, projection.height]),
@@ -206,6 +209,7 @@ impl Summary {
         Self {
             outcome: record.outcome,
             claimed_home: record.claimed_home,
+            failure: record.failure.clone(),
             final_distance_m: record.final_distance_m(),
             final_heading_error_rad: wrap(rest.heading - record.home.heading),
             time_s: record.time_s,

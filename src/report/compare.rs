@@ -8,7 +8,7 @@ use svg::node::element::{Group, Line, Rectangle, Text};
 use super::OutputFolder;
 use super::map::MapDrawing;
 use crate::episode::Outcome;
-use crate::episode::method::LawKind;
+use crate::episode::method::{LawKind, MethodKind};
 use crate::error::Result;
 use crate::geometry::Vector2;
 use crate::study::compare::{Comparison, Contender, Standing};
@@ -34,6 +34,7 @@ pub const FILES: &[&str] = &[
     "map-weber-compass.svg",
     "map-ibvs.svg",
     "map-ibvs-compass.svg",
+    "map-exec-#.svg",
 ];
 
 /// Columns of `compare.csv`.
@@ -50,10 +51,9 @@ pub fn write(mut folder: OutputFolder, world: &World, comparison: &Comparison, c
     let mut maps = Vec::new();
     if comparison.grid_spacing_m.is_some() {
         for standing in &comparison.standings {
-            let wanted = format!("map-{}.svg", standing.contender.key);
-            let Some(name) = FILES.iter().find(|name| **name == wanted) else { continue };
-            folder.write(name, map(world, comparison, standing).as_bytes())?;
-            maps.push(*name);
+            let name = format!("map-{}.svg", standing.contender.key);
+            folder.write(&name, map(world, comparison, standing).as_bytes())?;
+            maps.push(name);
         }
     }
     folder.write("README.md", readme(comparison, command, &maps).as_bytes())?;
@@ -111,7 +111,7 @@ fn cells(s: &Standing) -> [String; 11] {
     };
     let median = |spread: &Spread, scale: f64| value(spread.median, scale, 2);
     [
-        s.contender.key.to_owned(),
+        s.contender.key.to_string(),
         told(&s.contender).to_owned(),
         format!("{}/{}", s.home, s.runs),
         format!("{:.0}-{:.0} %", 100.0 * low, 100.0 * high),
@@ -157,7 +157,7 @@ pub fn table(comparison: &Comparison) -> String {
 
 /// The comparison as Markdown.
 #[must_use]
-pub fn readme(comparison: &Comparison, command: &str, maps: &[&str]) -> String {
+pub fn readme(comparison: &Comparison, command: &str, maps: &[String]) -> String {
     let c = comparison;
     let [first, last] = c.seeds;
     let mut text = format!(
@@ -188,6 +188,11 @@ pub fn readme(comparison: &Comparison, command: &str, maps: &[&str]) -> String {
     let _ = write!(text, "\n\n| {} |\n|---|---|{}\n", HEAD.join(" | "), "---:|".repeat(HEAD.len() - 2));
     for standing in &c.standings {
         let _ = writeln!(text, "| {} |", cells(standing).join(" | "));
+    }
+    for contender in c.standings.iter().map(|s| &s.contender) {
+        if let MethodKind::Exec(program) = &contender.method {
+            let _ = write!(text, "\n`{}` is the program `{program}`.\n", contender.key);
+        }
     }
     if !maps.is_empty() {
         text += "\n## Where from\n\nGreen: came home from there. Red: did not. Arrows: the homing vector at standstill.\n";
@@ -263,7 +268,7 @@ fn chart(comparison: &Comparison) -> String {
         let [low, high] = s.home_share_95;
         let ratio = s.time_ratio.median.map_or("-".to_owned(), |r| format!("{r:.2}"));
         body = body
-            .add(text(s.contender.key, BAR_PX[0] - 8.0, middle + 4.0, 12.0).set("text-anchor", "end"))
+            .add(text(&s.contender.key, BAR_PX[0] - 8.0, middle + 4.0, 12.0).set("text-anchor", "end"))
             .add(
                 Rectangle::new()
                     .set("x", px(at(0.0)))

@@ -175,8 +175,9 @@ pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<()> {
     })
 }
 
-/// A name that no other process takes at the same time, on this machine or on another one that sees the folder.
-fn partial_name(path: &Path) -> PathBuf {
+/// What a file is called while it is written: a name that no other process takes at the same time, on this machine or on another
+/// one that sees the folder.
+pub(super) fn partial_name(path: &Path) -> PathBuf {
     let since = std::time::UNIX_EPOCH.elapsed().unwrap_or_default();
     let mut name = path.file_name().unwrap_or_default().to_owned();
     name.push(format!(".{:x}-{:x}{PARTIAL}", std::process::id(), since.as_nanos()));

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
-use image::{DynamicImage, ImageBuffer, Luma, Rgb};
+use image::{DynamicImage, ImageBuffer, Luma};
 
 use crate::error::{Error, Result};
 use crate::panorama::Panorama;
@@ -13,8 +13,7 @@ use crate::panorama::Panorama;
 /// # Errors
 /// When the panorama cannot be encoded; `name` is what the error calls it.
 pub fn colours_png(panorama: &Panorama, name: &str) -> Result<Vec<u8>> {
-    let rgb = panorama.rgba.chunks_exact(4).flat_map(|p| [p[0], p[1], p[2]]).collect();
-    encode_filled(buffer::<Rgb<u8>>(panorama, rgb).map(DynamicImage::ImageRgb8), name)
+    panorama.picture().png().map_err(|source| Error::Image { path: Path::new(name).to_owned(), source })
 }
 
 /// The range in millimetres, rounded, 16 bits; 65535 stands for all that is farther.

@@ -23,7 +23,7 @@ mod field;
 mod frame;
 mod labels;
 mod legend;
-mod paint;
+pub(super) mod paint;
 mod scenery;
 
 use svg::node::element::Group;
@@ -132,15 +132,9 @@ impl MapDrawing {
     /// in the room frame, row by row, m^2. One that is not finite is left out.
     #[must_use]
     pub fn ellipse(mut self, centre: &Pose, covariance: [[f64; 2]; 2], k_sigma: f64) -> Self {
-        let [[xx, xy], [yx, yy]] = covariance;
-        let xy = 0.5 * (xy + yx);
-        // Eigenvalues of a symmetric 2 x 2 matrix, and the angle of the larger one's axis.
-        let (mean, half_difference) = (0.5 * (xx + yy), 0.5 * (xx - yy));
-        let spread = (half_difference * half_difference + xy * xy).sqrt();
-        let (long, short) = ((mean + spread).max(0.0).sqrt(), (mean - spread).max(0.0).sqrt());
-        let angle_rad = 0.5 * atan2(xy, half_difference);
-        if centre.is_finite() && long.is_finite() && angle_rad.is_finite() {
-            let radii_px = [long, short].map(|sd| k_sigma * sd * self.frame.px_per_m);
+        let (radii_m, angle_rad) = ellipse_axes(covariance, k_sigma);
+        if centre.is_finite() && radii_m[0].is_finite() && angle_rad.is_finite() {
+            let radii_px = radii_m.map(|radius| radius * self.frame.px_per_m);
             let shape = ellipse(self.frame.at(centre.position()), radii_px, angle_rad);
             self.ellipses = self.ellipses.add(shape);
             self.legend.add(Swatch::Ellipse, &format!("{k_sigma}-sigma ellipse of the estimate"));
@@ -195,6 +189,18 @@ impl MapDrawing {
         }
         document.add(map).add(legend.group).to_string() + "\n"
     }
+}
+
+/// Long and short half axis, m, of the ellipse of `k_sigma` standard deviations, and the long one's angle, rad. `covariance` is
+/// that of x and y, row by row, m^2.
+pub(in crate::report) fn ellipse_axes(covariance: [[f64; 2]; 2], k_sigma: f64) -> ([f64; 2], f64) {
+    let [[xx, xy], [yx, yy]] = covariance;
+    let xy = 0.5 * (xy + yx);
+    // Eigenvalues of a symmetric 2 x 2 matrix, and the angle of the larger one's axis.
+    let (mean, half_difference) = (0.5 * (xx + yy), 0.5 * (xx - yy));
+    let spread = (half_difference * half_difference + xy * xy).sqrt();
+    let radii = [mean + spread, mean - spread].map(|variance| k_sigma * variance.max(0.0).sqrt());
+    (radii, 0.5 * atan2(xy, half_difference))
 }
 
 /// A world's map with its name as title.

@@ -13,6 +13,7 @@ pub mod map;
 pub mod paper;
 mod path_plot;
 pub mod physics;
+pub mod recording;
 pub mod render;
 pub mod robustness;
 pub mod run;
@@ -20,6 +21,7 @@ pub mod seeds;
 pub mod sheet;
 pub mod sweep;
 pub mod text;
+mod tum;
 pub mod vision;
 
 pub use folder::{GrowingFile, OutputFolder, write_atomically};

@@ -41,6 +41,7 @@ fn title(world: &World, record: &Record) -> String {
         Outcome::Lost if record.claimed_home => "claimed to be home",
         Outcome::Lost => "lost",
         Outcome::Stuck => "stuck",
+        Outcome::Failed => "method broke",
     };
     format!(
         "{}: {outcome}, {:.1} cm from home after {:.1} s",
@@ -55,7 +56,7 @@ fn positions(steps: &[Step], pose: impl Fn(&Step) -> Pose) -> impl Iterator<Item
 }
 
 /// Covariance of the estimate's position, turned from the home frame into the room's, m^2.
-fn in_room(home: &Pose, estimate: &Estimate) -> [[f64; 2]; 2] {
+pub(super) fn in_room(home: &Pose, estimate: &Estimate) -> [[f64; 2]; 2] {
     let (s, c) = sin_cos(home.heading);
     let p = &estimate.covariance;
     let (xx, xy, yy) = (p[(0, 0)], p[(0, 1)], p[(1, 1)]);

@@ -2,14 +2,23 @@
 
 use super::image::colours_png;
 use super::path_plot::path_svg;
-use super::{OutputFolder, json};
+use super::{OutputFolder, json, tum};
 use crate::episode::{Belief, Record, Step, Summary};
 use crate::error::Result;
 use crate::world::World;
 
-/// Names of all files of a run; those of panoramas are there when the sensor has a camera.
-pub const FILES: &[&str] =
-    &["summary.json", "trajectory.csv", "path.svg", "home.png", "panorama_start.png", "panorama_end.png"];
+/// Names of all files of a run; those of panoramas are there when the sensor has a camera, that of estimates when the method has any.
+pub const FILES: &[&str] = &[
+    "summary.json",
+    "trajectory.csv",
+    "trajectory.tum",
+    "odometry.tum",
+    "estimate.tum",
+    "path.svg",
+    "home.png",
+    "panorama_start.png",
+    "panorama_end.png",
+];
 
 /// Columns of `trajectory.csv`.
 const COLUMNS: [&str; 20] = [
@@ -49,6 +58,9 @@ pub fn write(mut folder: OutputFolder, world: &World, record: &Record, summary: 
         }
     }
     folder.write("trajectory.csv", trajectory_csv(&record.steps).as_bytes())?;
+    for (name, text) in tum::trajectories(record) {
+        folder.write(name, text.as_bytes())?;
+    }
     folder.write("path.svg", path_svg(world, record).as_bytes())?;
     // Last, so that a folder with a summary is complete.
     folder.write("summary.json", json(summary).as_bytes())?;

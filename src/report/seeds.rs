@@ -5,8 +5,8 @@ use crate::episode::Summary;
 use crate::error::Result;
 use crate::study::seeds::SeedsSummary;
 
-/// Names of all files of a batch.
-pub const FILES: &[&str] = &["summary.json", "seeds.csv"];
+/// Names of all files of a batch; the last is there when a method broke.
+pub const FILES: &[&str] = &["summary.json", "seeds.csv", "failures.csv"];
 
 /// Columns of `seeds.csv`.
 const COLUMNS: [&str; 17] = [
@@ -35,6 +35,9 @@ const COLUMNS: [&str; 17] = [
 /// When a file cannot be written.
 pub fn write(mut folder: OutputFolder, batch: &SeedsSummary, runs: &[Summary]) -> Result<()> {
     folder.write("seeds.csv", seeds_csv(runs).as_bytes())?;
+    if let Some(table) = failures_csv(runs) {
+        folder.write("failures.csv", &table)?;
+    }
     folder.write("summary.json", json(batch).as_bytes())?;
     folder.finish()
 }
@@ -49,6 +52,18 @@ pub fn seeds_csv(runs: &[Summary]) -> String {
         text.push('\n');
     }
     text
+}
+
+/// Seed and reason of each run whose method broke; `None` where none did.
+fn failures_csv(runs: &[Summary]) -> Option<Vec<u8>> {
+    let mut table = csv::Writer::from_writer(Vec::new());
+    table.write_record(["seed", "failure"]).ok()?;
+    let mut any = false;
+    for (run, failure) in runs.iter().filter_map(|run| Some((run, run.failure.as_ref()?))) {
+        any = true;
+        table.write_record([&run.seed.to_string(), failure]).ok()?;
+    }
+    table.into_inner().ok().filter(|_| any)
 }
 
 /// The cells of one run in the order of [`COLUMNS`].

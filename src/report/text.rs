@@ -18,8 +18,12 @@ pub fn run(summary: &Summary, folder: &Path) -> String {
         Outcome::Lost if s.claimed_home => format!("not home: claimed to be after {:.1} s, {distance} from it", s.time_s),
         Outcome::Lost => format!("not home: lost after {:.1} s, {distance} from it", s.time_s),
         Outcome::Stuck => format!("not home: stuck after {:.1} s, {distance} from it", s.time_s),
+        Outcome::Failed => format!("not home: the method broke after {:.1} s, {distance} from it", s.time_s),
     };
     let mut rows: Vec<(&str, String)> = Vec::new();
+    if let Some(failure) = &s.failure {
+        rows.push(("method", failure.clone()));
+    }
     if let (Some(ratio), Some(straight)) = (s.time_ratio, s.straight_line_time_s) {
         rows.push(("time ratio", format!("{ratio:.2} (straight line {straight:.1} s)")));
     }
@@ -144,10 +148,12 @@ pub fn seeds(batch: &SeedsSummary, runs: &[Summary], folder: &Path) -> String {
         ("NEES (3 is consistent)", spread(&b.nees, 1.0, "")),
         ("wrong claims", b.wrong_claims.to_string()),
         ("timeout, lost, stuck", format!("{}, {}, {}", b.outcomes.timeout, b.outcomes.lost, b.outcomes.stuck)),
+        ("method broke", b.outcomes.failed.to_string()),
         ("runs with collisions", b.runs_with_collisions.to_string()),
         ("files", folder.display().to_string()),
     ];
-    text + &table(&headline, &rows)
+    let shown = rows.into_iter().filter(|(name, value)| *name != "method broke" || value != "0");
+    text + &table(&headline, &shown.collect::<Vec<_>>())
 }
 
 fn centimetres(metres: f64) -> String {

@@ -274,7 +274,7 @@ impl Path {
             sensor: NoisySensor::new(IdealSensor::new(world), world.landmark_count, settings.noise(), seed),
             bodies: Vec::new(),
         };
-        let briefing = setup.briefing(world, sensor.home().clone());
+        let briefing = setup.briefing(world, &sensor);
         let mut method =
             method::build(MethodKind::AnchoredEkf, LawKind::Proportional, FilterSettings::default(), briefing, None)?;
         let task = setup.task(world);

@@ -4,6 +4,7 @@
 //! random starts there are those on an even grid, all with one heading: the share from which a method arrives is its catchment area, and
 //! for methods that have a homing vector at standstill the mean angle between it and the direction of home is its AAE.
 
+use std::borrow::Cow;
 use std::ops::{ControlFlow, RangeInclusive};
 
 use serde::Serialize;
@@ -11,6 +12,7 @@ use serde::Serialize;
 use super::seeds::{Job, SeedEvent, Spread, run_jobs};
 use super::statistics::wilson_95;
 use crate::control::vectors::{VectorLaw, align};
+use crate::episode::method::exec::ExecCommand;
 use crate::episode::method::{LawKind, MethodKind};
 use crate::episode::{Bearings, Bench, Outcome, PlantKind, Setup, SetupRecord, Summary};
 use crate::error::{Error, Result};
@@ -20,10 +22,10 @@ use crate::world::World;
 use crate::world::polygon::{anticlockwise, bounds, contains};
 
 /// A method with what it is told.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Contender {
     /// Its name in files and on the command line.
-    pub key: &'static str,
+    pub key: Cow<'static, str>,
     /// The method.
     pub method: MethodKind,
     /// What steers it.
@@ -35,19 +37,23 @@ pub struct Contender {
 }
 
 const fn contender(key: &'static str, method: MethodKind, law: LawKind) -> Contender {
-    Contender { key, method, law, compass: false, told_start: false }
+    Contender { key: Cow::Borrowed(key), method, law, compass: false, told_start: false }
 }
 
 const fn with_compass(key: &'static str, method: MethodKind) -> Contender {
-    Contender { key, method, law: LawKind::Proportional, compass: true, told_start: false }
+    Contender { key: Cow::Borrowed(key), method, law: LawKind::Proportional, compass: true, told_start: false }
 }
 
-/// All contenders, in the order of tables.
+const fn told(key: &'static str, law: LawKind) -> Contender {
+    Contender { key: Cow::Borrowed(key), method: MethodKind::PaperEkf, law, compass: false, told_start: true }
+}
+
+/// All contenders that the project brings, in the order of tables.
 pub const CONTENDERS: [Contender; 14] = [
     contender("anchored-ekf", MethodKind::AnchoredEkf, LawKind::Proportional),
     contender("anchored-ekf-lyapunov", MethodKind::AnchoredEkf, LawKind::Lyapunov),
-    Contender { told_start: true, ..contender("paper-ekf-told", MethodKind::PaperEkf, LawKind::Proportional) },
-    Contender { told_start: true, ..contender("paper-ekf-told-lyapunov", MethodKind::PaperEkf, LawKind::Lyapunov) },
+    told("paper-ekf-told", LawKind::Proportional),
+    told("paper-ekf-told-lyapunov", LawKind::Lyapunov),
     contender("paper-ekf", MethodKind::PaperEkf, LawKind::Proportional),
     contender("paper-ekf-lyapunov", MethodKind::PaperEkf, LawKind::Lyapunov),
     contender("alv", MethodKind::Alv, LawKind::Proportional),
@@ -61,11 +67,18 @@ pub const CONTENDERS: [Contender; 14] = [
 ];
 
 impl Contender {
+    /// A program of the user's own, the `number`th of a comparison. It has a compass where one is asked for.
+    #[must_use]
+    pub fn program(number: usize, command: ExecCommand, compass: bool) -> Self {
+        let key = Cow::Owned(format!("exec-{number}"));
+        Self { key, method: MethodKind::Exec(command), law: LawKind::Proportional, compass, told_start: false }
+    }
+
     /// The law of its homing vector; `None` for filters, which have none at standstill.
     #[must_use]
     pub fn vector_law(&self) -> Option<VectorLaw> {
         match self.method {
-            MethodKind::AnchoredEkf | MethodKind::PaperEkf => None,
+            MethodKind::AnchoredEkf | MethodKind::PaperEkf | MethodKind::Exec(_) => None,
             MethodKind::Alv => Some(VectorLaw::Alv),
             MethodKind::TronDaniilidis => Some(VectorLaw::TronDaniilidis),
             MethodKind::Weber => Some(VectorLaw::Weber),
@@ -76,7 +89,7 @@ impl Contender {
     /// `setup` with this contender's method.
     fn setup(&self, setup: &Setup) -> Setup {
         Setup {
-            method: self.method,
+            method: self.method.clone(),
             law: self.law,
             compass_sd_rad: if self.compass { Some(setup.compass_sd_rad.unwrap_or(0.0)) } else { None },
             told_start: self.told_start,
@@ -271,7 +284,7 @@ fn standing(contender: &Contender, random: &[Summary], grid: &[Summary], vectors
     let errors: Vec<f64> = vectors.iter().flatten().map(|v| v.1).collect();
     let came = || random.iter().filter(|r| r.outcome == Outcome::Home);
     Standing {
-        contender: *contender,
+        contender: contender.clone(),
         runs: random.len(),
         home,
         home_share_95: wilson_95(home, random.len()),
@@ -300,11 +313,11 @@ fn standing(contender: &Contender, random: &[Summary], grid: &[Summary], vectors
 /// # Errors
 /// When a name is none of theirs.
 pub fn pick(names: &[String]) -> Result<Vec<Contender>> {
-    let keys = || CONTENDERS.iter().map(|c| c.key).collect::<Vec<_>>().join(", ");
+    let keys = || CONTENDERS.map(|c| c.key).join(", ");
     if let Some(unknown) = names.iter().find(|name| CONTENDERS.iter().all(|c| c.key != name.as_str())) {
         return Err(Error::Invalid { what: "contender".into(), found: unknown.clone(), allowed: keys() });
     }
-    Ok(CONTENDERS.into_iter().filter(|c| names.is_empty() || names.iter().any(|n| n == c.key)).collect())
+    Ok(CONTENDERS.into_iter().filter(|c| names.is_empty() || names.iter().any(|n| n.as_str() == c.key)).collect())
 }
 
 #[cfg(test)]

@@ -174,6 +174,14 @@ pub struct OutcomeCounts {
     pub lost: usize,
     /// Did not move.
     pub stuck: usize,
+    /// The method broke; left out where it never did.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub failed: usize,
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "the signature that serde asks for")]
+fn is_zero(count: &usize) -> bool {
+    *count == 0
 }
 
 /// Median and outer values; each `None` where there are none.
@@ -216,6 +224,7 @@ impl SeedsSummary {
                 timeout: count(Outcome::Timeout),
                 lost: count(Outcome::Lost),
                 stuck: count(Outcome::Stuck),
+                failed: count(Outcome::Failed),
             },
             wrong_claims: runs.iter().filter(|r| r.claimed_home && r.outcome != Outcome::Home).count(),
             time_ratio: Spread::of(runs.iter().filter_map(|r| r.time_ratio)),

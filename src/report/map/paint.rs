@@ -5,11 +5,11 @@ use svg::node::element::{Circle, Ellipse, Group, Line, Path, Polygon, Polyline, 
 use crate::geometry::{Vector2, direction};
 
 /// Text and lines in front.
-pub(super) const INK: &str = "#1a1a1a";
+pub(in crate::report) const INK: &str = "#1a1a1a";
 /// Text and lines behind.
 pub(super) const FAINT_INK: &str = "#6b6b6b";
 /// Home.
-pub(super) const HOME: &str = "#c0143c";
+pub(in crate::report) const HOME: &str = "#c0143c";
 /// End of a run.
 pub(super) const END: &str = "#0072b2";
 /// Named starts and the start region.
@@ -17,7 +17,7 @@ pub(super) const STARTS: &str = "#4a7a2c";
 
 /// How a kind of body is filled and outlined.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct BodyPaint {
+pub(in crate::report) struct BodyPaint {
     pub fill: &'static str,
     pub line: &'static str,
     /// Drawn see-through with a dashed outline: hangs above the robot.
@@ -25,20 +25,20 @@ pub(super) struct BodyPaint {
 }
 
 impl BodyPaint {
-    pub(super) fn landmark(dashed: bool) -> Self {
+    pub(in crate::report) fn landmark(dashed: bool) -> Self {
         Self { fill: "#8db4d6", line: "#2f5d86", dashed }
     }
-    pub(super) fn obstacle(dashed: bool) -> Self {
+    pub(in crate::report) fn obstacle(dashed: bool) -> Self {
         Self { fill: "#cfc6b8", line: "#7a6c58", dashed }
     }
-    pub(super) fn mover(dashed: bool) -> Self {
+    pub(in crate::report) fn mover(dashed: bool) -> Self {
         Self { fill: "#f2b36b", line: "#a65c0f", dashed }
     }
 }
 
 /// Colour of a floor zone: green-blue where it slips, sand where it grips, and near-white around the friction of a common
 /// floor.
-pub(super) fn friction_colour(friction: f64) -> String {
+pub(in crate::report) fn friction_colour(friction: f64) -> String {
     const RAMP: [(f64, [f64; 3]); 5] = [
         (0.0, [112.0, 200.0, 200.0]),
         (0.25, [168.0, 222.0, 218.0]),

@@ -100,7 +100,7 @@ pub fn drive(terms: &Terms, start: Pose, eyes: &mut Eyes<'_>, compass: bool, met
         let time_s = samples.len() as f64 * terms.period_s;
         let bearings = eyes(&truth);
         let compass_rad = compass.then_some(truth.heading);
-        let decision = method.step(&Observation { time_s, odometry, bearings: &bearings, compass_rad });
+        let decision = method.step(&Observation { time_s, odometry, bearings: &bearings, compass_rad, panorama: None });
         samples.push(Sample { time_s, truth, estimate: decision.estimate.map(|e| e.pose) });
         let home = truth.position().norm() <= terms.radius_m;
         let twist = decision.command;
@@ -188,7 +188,8 @@ pub fn anchored(law: Law, terms: &Terms, home: &HomeSnapshot) -> Result<Box<dyn 
         max_acceleration_m_s2: 10.0,
     };
     let task = TaskSheet { speed_m_s: terms.speed_m_s, control_period_s: terms.period_s, arrival_radius_m: terms.radius_m };
-    method::build(MethodKind::AnchoredEkf, law, FilterSettings::default(), Briefing { home: home.clone(), robot, task }, None)
+    let briefing = Briefing { home: home.clone(), robot, task, compass: false, camera: None };
+    method::build(MethodKind::AnchoredEkf, law, FilterSettings::default(), briefing, None)
 }
 
 /// A homing vector at constant speed, steered by the same two laws: proportionally to the angle between heading and vector,

@@ -39,8 +39,10 @@ const MEASURES: [Measure; 21] = [
     ("matched_mean", |s| Some(s.landmarks.matched_mean)),
     ("rejected_mean", |s| Some(s.landmarks.rejected_mean)),
 ];
+/// A whole number that a summary has.
+type CountOf = fn(&Summary) -> usize;
 /// Whole numbers of a row.
-const COUNTS: [(&str, fn(&Summary) -> usize); 3] =
+const COUNTS: [(&str, CountOf); 3] =
     [("collisions", |s| s.collisions), ("home_landmarks", |s| s.landmarks.home), ("steps", |s| s.steps)];
 
 /// One episode.
@@ -81,6 +83,7 @@ impl Row {
                 Some(hit) => format!("did not move although told to; last ran into {}", hit.with),
                 None => "did not move although told to".to_owned(),
             },
+            Outcome::Failed => summary.failure.clone().unwrap_or_else(|| "the method failed".to_owned()),
         };
         let finite = |value: Option<f64>| value.filter(|v| v.is_finite());
         Self {

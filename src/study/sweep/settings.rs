@@ -230,12 +230,16 @@ fn distance(a: &str, b: &str) -> usize {
     row[b.len()]
 }
 
-/// A contender's method, and what else its name says; what it does not say stays.
+/// A contender's method, and what else its name says; what it does not say stays. `exec:COMMAND` is a program of the user's own.
 fn set_method(setup: &mut Setup, name: &str) -> std::result::Result<(), Refusal> {
-    let keys = || CONTENDERS.iter().map(|c| c.key).collect::<Vec<_>>().join(", ");
+    if name.starts_with("exec:") {
+        setup.method = name.parse().map_err(|error: Error| error.to_string())?;
+        return setup.method.check().map_err(|error| error.to_string());
+    }
+    let keys = || CONTENDERS.iter().map(|c| c.key.as_ref()).collect::<Vec<_>>().join(", ") + ", exec:COMMAND";
     let found = pick(&[name.to_owned()]).map_err(|_| keys())?;
     let contender = found.first().ok_or_else(keys)?;
-    setup.method = contender.method;
+    setup.method = contender.method.clone();
     if contender.law != LawKind::Proportional {
         setup.law = contender.law;
     }
@@ -319,7 +323,7 @@ mod tests {
         }
         let world = case.draft.world().unwrap();
         let setup = &case.setup;
-        assert_eq!((setup.method, setup.filter.gate, setup.extractor.features), (MethodKind::Alv, 9.0, 200));
+        assert_eq!((setup.method.clone(), setup.filter.gate, setup.extractor.features), (MethodKind::Alv, 9.0, 200));
         assert!((setup.compass_sd_rad.unwrap() - 3.0_f64.to_radians()).abs() < 1e-12 && setup.degradation.hidden == 0.5);
         assert_eq!((world.spec.task.arrival_radius_m, world.spec.floor.friction), (0.1, 0.2));
         assert_eq!(world.bodies.len(), world.landmark_count + 3);

@@ -1,0 +1,138 @@
+//! A file that is written piece by piece and appears only when it is whole.
+
+use std::fs::{self, File};
+use std::io::{self, BufWriter, Read, Seek, SeekFrom, Write};
+use std::path::{Path, PathBuf};
+
+use crate::error::{Error, Result};
+use crate::report::folder::{io_error, partial_name};
+
+/// What every recording holds near its beginning, so that a later one knows that it may take its place.
+pub(super) const MAKER: &str = "wayhome";
+/// How near, bytes.
+const NEAR: u64 = 2048;
+
+/// A kind of recording.
+pub(super) struct Kind {
+    /// First bytes of such a file.
+    pub magic: &'static [u8],
+}
+
+/// The folder that a file lies in.
+pub(super) fn folder_of(path: &Path) -> &Path {
+    path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
+/// Checks that a recording can be written: its folder is there, and the file is not there or an older recording.
+///
+/// # Errors
+/// When that is not so.
+pub(super) fn check(path: &Path, kind: &Kind) -> Result<()> {
+    let folder = folder_of(path);
+    if !fs::metadata(folder).map_err(io_error("write to folder", folder))?.is_dir() {
+        let source = io::Error::from(io::ErrorKind::NotADirectory);
+        return Err(Error::Io { action: "write to folder", path: folder.to_owned(), source });
+    }
+    let taken = || Error::FileTaken { path: path.to_owned() };
+    let mut start = Vec::new();
+    match fs::metadata(path) {
+        Err(e) if e.kind() == io::ErrorKind::NotFound => return Ok(()),
+        Ok(found) if found.is_file() => {}
+        Ok(_) => return Err(taken()),
+        Err(source) => return Err(Error::Io { action: "read", path: path.to_owned(), source }),
+    }
+    File::open(path).and_then(|file| file.take(NEAR).read_to_end(&mut start)).map_err(io_error("read", path))?;
+    let ours = start.starts_with(kind.magic) && start.windows(MAKER.len()).any(|bytes| bytes == MAKER.as_bytes());
+    if ours { Ok(()) } else { Err(taken()) }
+}
+
+/// A recording on its way to disk. Dropped before [`RecordingFile::complete`] it leaves nothing.
+#[derive(Debug)]
+pub(super) struct RecordingFile {
+    path: PathBuf,
+    partial: PathBuf,
+    writer: BufWriter<File>,
+    written: u64,
+}
+
+impl RecordingFile {
+    /// Begins the file under another name.
+    ///
+    /// # Errors
+    /// As [`check`], and when the file cannot be created.
+    pub(super) fn create(path: &Path, kind: &Kind) -> Result<Self> {
+        check(path, kind)?;
+        let partial = partial_name(path);
+        let file = File::create(&partial).map_err(io_error("write", path))?;
+        Ok(Self { path: path.to_owned(), partial, writer: BufWriter::new(file), written: 0 })
+    }
+
+    /// Bytes written so far.
+    pub(super) fn written(&self) -> u64 {
+        self.written
+    }
+
+    /// Gives the file its name.
+    ///
+    /// # Errors
+    /// When what is left of it cannot be written.
+    pub(super) fn complete(mut self) -> Result<()> {
+        let done = self.writer.flush().and_then(|()| fs::rename(&self.partial, &self.path));
+        done.map_err(io_error("write", &self.path))
+    }
+}
+
+impl Write for RecordingFile {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let count = self.writer.write(bytes)?;
+        self.written += count as u64;
+        Ok(count)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.writer.flush()
+    }
+}
+
+impl Seek for RecordingFile {
+    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+        self.writer.seek(to)
+    }
+}
+
+impl Drop for RecordingFile {
+    fn drop(&mut self) {
+        // Best effort, and nothing to do once it is complete: the next recording of that name would take its place.
+        let _ = fs::remove_file(&self.partial);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const KIND: Kind = Kind { magic: b"GIF89a" };
+
+    #[test]
+    fn only_older_recordings_are_replaced() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("run.gif");
+        let mut file = RecordingFile::create(&path, &KIND).unwrap();
+        file.write_all(b"GIF89a by wayhome").unwrap();
+        assert!(!path.exists(), "not before it is whole");
+        file.complete().unwrap();
+        let mut second = RecordingFile::create(&path, &KIND).unwrap();
+        second.write_all(b"half").unwrap();
+        drop(second);
+        assert_eq!(fs::read(&path).unwrap(), b"GIF89a by wayhome");
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1, "nothing half written stays");
+        for foreign in [&b"GIF89a by somebody"[..], b"by wayhome", b""] {
+            fs::write(&path, foreign).unwrap();
+            assert!(matches!(RecordingFile::create(&path, &KIND), Err(Error::FileTaken { .. })));
+        }
+        assert!(matches!(check(folder.path(), &KIND), Err(Error::FileTaken { .. })));
+        let nowhere = check(&folder.path().join("no/run.gif"), &KIND).unwrap_err().to_string();
+        assert!(nowhere.ends_with("no"), "{nowhere}");
+        assert!(check(&path.join("run.gif"), &KIND).is_err(), "below a file");
+    }
+}
