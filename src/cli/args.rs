@@ -95,6 +95,8 @@ pub enum Command {
     Render(Box<RenderArgs>),
     /// How fast the renderer is and what it shows: a page with the speeds, and sheets of all worlds and presets
     RenderReport(RenderReportArgs),
+    /// Panorama sets with ground truth in the field's layouts; their check; how fast they are made
+    Dataset(Box<super::dataset::DatasetArgs>),
     /// Check, draw and describe world files
     World(WorldArgs),
 }

@@ -6,11 +6,10 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use crate::error::{Error, Result};
+use crate::storage::{PARTIAL, io_error, partial_name, write_atomically};
 
 /// File that marks a folder as ours; it holds the name of the verb that writes it.
 const MARKER: &str = ".wayhome";
-/// Ending of files that are still being written.
-const PARTIAL: &str = ".wayhome-partial";
 
 /// A folder of results that one verb of the program writes.
 ///
@@ -155,25 +154,6 @@ impl Drop for GrowingFile {
     }
 }
 
-/// Writes a file under another name and renames it, so that it is never seen half written.
-///
-/// # Errors
-/// When the file cannot be written.
-pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<()> {
-    let partial = partial_name(path);
-    fs::write(&partial, bytes).and_then(|()| fs::rename(&partial, path)).map_err(|source| {
-        // Best effort: the write itself is what failed and what the caller hears about.
-        let _ = fs::remove_file(&partial);
-        Error::Io { action: "write", path: path.to_owned(), source }
-    })
-}
-
-fn partial_name(path: &Path) -> PathBuf {
-    let mut name = path.file_name().unwrap_or_default().to_owned();
-    name.push(PARTIAL);
-    path.with_file_name(name)
-}
-
 fn remove(path: &Path) -> Result<()> {
     match fs::remove_file(path) {
         Err(source) if source.kind() != io::ErrorKind::NotFound => {
@@ -181,10 +161,6 @@ fn remove(path: &Path) -> Result<()> {
         }
         _ => Ok(()),
     }
-}
-
-fn io_error(action: &'static str, path: &Path) -> impl Fn(io::Error) -> Error {
-    move |source| Error::Io { action, path: path.to_owned(), source }
 }
 
 #[cfg(test)]
