@@ -12,8 +12,7 @@ use crate::error::{Error, Result};
 pub const PARTIAL: &str = ".wayhome-partial";
 
 /// The name under which a file is written before it is whole.
-#[must_use]
-pub fn partial_name(path: &Path) -> PathBuf {
+fn partial_name(path: &Path) -> PathBuf {
     let mut name = path.file_name().unwrap_or_default().to_owned();
     name.push(PARTIAL);
     path.with_file_name(name)

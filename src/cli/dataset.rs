@@ -8,7 +8,8 @@ use std::sync::Mutex;
 
 use anyhow::{Result, bail};
 use serde::Serialize;
-use wayhome::panorama_set::Layout;
+use wayhome::episode::sensor::DatasetChoice;
+use wayhome::panorama_set::{Layout, Place};
 use wayhome::render::{self, RendererChoice};
 use wayhome::report::{OutputFolder, dataset as report};
 use wayhome::study::dataset::check::{Inspection, check};
@@ -120,6 +121,49 @@ pub enum DatasetCommand {
         #[arg(long, value_name = "DIR")]
         out: Option<PathBuf>,
     },
+}
+
+/// The set that `--bearings dataset` looks at.
+#[derive(Debug, Clone, clap::Args)]
+pub struct SetArgs {
+    /// Set of panoramas for `--bearings dataset`, in any layout that `dataset` writes, or a real one
+    #[arg(long, value_name = "DIR", required_if_eq("bearings", "dataset"))]
+    pub dataset: Option<PathBuf>,
+    /// Condition of the set [default: its first]
+    #[arg(long, value_name = "NAME", requires = "dataset")]
+    pub dataset_condition: Option<String>,
+    /// Condition of the home panorama, if another than on the way
+    #[arg(long, value_name = "NAME", requires = "dataset")]
+    pub dataset_home_condition: Option<String>,
+    /// Distance between places of a set that does not tell it, m
+    #[arg(long, value_name = "S", requires = "dataset", allow_negative_numbers = true, value_parser = positive)]
+    pub dataset_spacing_m: Option<f64>,
+    /// Row and column of home, from 0, of a set that does not tell it [default: the middle]
+    #[arg(long, value_name = "I,J", requires = "dataset", value_parser = place)]
+    pub dataset_home: Option<Place>,
+}
+
+impl SetArgs {
+    /// Whether any of them is given.
+    pub fn is_given(&self) -> bool {
+        self.dataset.is_some()
+    }
+
+    /// What they stand for.
+    pub fn choice(&self) -> Option<DatasetChoice> {
+        self.dataset.as_ref().map(|folder| DatasetChoice {
+            folder: folder.clone(),
+            condition: self.dataset_condition.clone(),
+            home_condition: self.dataset_home_condition.clone(),
+            spacing_m: self.dataset_spacing_m,
+            home: self.dataset_home,
+        })
+    }
+}
+
+fn place(text: &str) -> Result<Place, String> {
+    let numbers = text.split_once(',').and_then(|(i, j)| Some((i.trim().parse().ok()?, j.trim().parse().ok()?)));
+    numbers.map(|(i, j)| Place { i, j }).ok_or_else(|| "a place is I,J: its row and column, from 0".into())
 }
 
 /// Headings as the command line has them.

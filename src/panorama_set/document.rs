@@ -47,6 +47,8 @@ pub struct Document {
     pub range_unit: String,
     /// Home of the world in the room.
     pub home: FramePose,
+    /// SHA-256 of all poses: two routes of one name are two sets.
+    pub poses_sha256: String,
     /// Heading of all frames, rad, where it is the same.
     pub heading_rad: Option<f64>,
     /// The grid, for a set on one.

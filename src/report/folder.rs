@@ -6,7 +6,7 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use crate::error::{Error, Result};
-use crate::storage::{PARTIAL, io_error, partial_name, write_atomically};
+use crate::storage::{self, PARTIAL, io_error, write_atomically};
 
 /// File that marks a folder as ours; it holds the name of the verb that writes it.
 const MARKER: &str = ".wayhome";
@@ -81,18 +81,15 @@ impl OutputFolder {
     /// As [`Self::write`].
     pub fn begin(&self, name: &'static str) -> Result<GrowingFile> {
         assert!(self.names.contains(&name), "`{name}` is not announced");
-        let path = self.path.join(name);
-        let partial = partial_name(&path);
-        let file = fs::File::create(&partial).map_err(io_error("write", &path))?;
-        Ok(GrowingFile { name, path, partial, writer: io::BufWriter::new(file) })
+        Ok(GrowingFile { name, path: self.path.join(name), file: storage::GrowingFile::create(&self.path.join(name))? })
     }
 
     /// Puts a file that was written piece by piece in its place.
     ///
     /// # Errors
     /// When what is left of it cannot be written.
-    pub fn complete(&mut self, mut file: GrowingFile) -> Result<()> {
-        file.writer.flush().and_then(|()| fs::rename(&file.partial, &file.path)).map_err(io_error("write", &file.path))?;
+    pub fn complete(&mut self, file: GrowingFile) -> Result<()> {
+        file.file.complete()?;
         self.written.insert(file.name.to_owned());
         Ok(())
     }
@@ -133,8 +130,7 @@ fn is_announced(names: &[&str], file: &str) -> bool {
 pub struct GrowingFile {
     name: &'static str,
     path: PathBuf,
-    partial: PathBuf,
-    writer: io::BufWriter<fs::File>,
+    file: storage::GrowingFile,
 }
 
 impl GrowingFile {
@@ -143,14 +139,7 @@ impl GrowingFile {
     /// # Errors
     /// When it cannot be written.
     pub fn append(&mut self, text: &str) -> Result<()> {
-        self.writer.write_all(text.as_bytes()).map_err(io_error("write", &self.path))
-    }
-}
-
-impl Drop for GrowingFile {
-    fn drop(&mut self) {
-        // Best effort, and nothing to do once it is complete: the next run would remove it too.
-        let _ = fs::remove_file(&self.partial);
+        self.file.write_all(text.as_bytes()).map_err(io_error("write", &self.path))
     }
 }
 

@@ -12,7 +12,7 @@ use crate::panorama::Projection;
 use crate::panorama_set::{ConditionDocument, Document, Frame, GridDocument, Instance, Layout, Place};
 use crate::random::{Seed, Stream};
 use crate::render::RendererInfo;
-use crate::storage::io_error;
+use crate::storage::{io_error, sha256};
 use crate::study::film;
 use crate::world::World;
 use crate::world::polygon::{bounds, contains_within};
@@ -256,6 +256,7 @@ impl Plan {
             camera_height_m: world.spec.camera.height_m,
             range_unit: "mm; 65535 stands for all that is farther".into(),
             home: world.home.into(),
+            poses_sha256: sha256(&self.spots.iter().flat_map(pose_bytes).collect::<Vec<u8>>()),
             heading_rad,
             grid: self.grid.clone(),
             instances: world.instances().into_iter().map(|(id, name)| Instance { id, name, landmark: landmark(id) }).collect(),
@@ -265,6 +266,11 @@ impl Plan {
             frames_per_part: PART_FRAMES,
         }
     }
+}
+
+fn pose_bytes(spot: &Spot) -> impl Iterator<Item = u8> + use<> {
+    let Pose { x, y, heading } = spot.robot;
+    [x, y, heading, spot.time_s.unwrap_or(f64::NAN)].into_iter().flat_map(f64::to_le_bytes)
 }
 
 fn invalid(what: &str, found: impl Into<String>, allowed: impl Into<String>) -> Error {
