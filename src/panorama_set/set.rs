@@ -92,7 +92,7 @@ impl PanoramaSet {
             }),
             Layout::Moeller => moeller::find(folder),
             Layout::ImageDatabase => in_each(&|path| Ok(path.join(image_database::ENTRIES).is_file()), &|path, condition| {
-                image_database::find(folder, path, condition)
+                image_database::find(folder, path, condition, grid)
             }),
             Layout::Webdataset => webdataset::find(folder),
             Layout::Folder => in_each(&|path| folder::holds(path), &|path, condition| folder::find(path, condition)),

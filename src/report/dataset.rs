@@ -114,10 +114,10 @@ fn projection(d: &Document) -> String {
         d.range_unit
     );
     if clockwise {
-        let _ = write!(
+        let _ = writeln!(
             text,
             "Columns of the tables and pictures in `home/` are counted anti-clockwise: column c there is column ({} - c) mod {} of the \
-             files.\n",
+             files.",
             p.width, p.width
         );
     }

@@ -4,11 +4,13 @@ usage: dataset_readers.py FOLDER
 """
 
 import glob
+import io
 import json
 import os
 import sys
 
 import numpy
+import PIL.Image
 import pyarrow.parquet
 import webdataset
 
@@ -24,11 +26,11 @@ def checksum(pixels):
 def samples(folder):
     shards = sorted(glob.glob(os.path.join(folder, "shards", "*.tar")))
     found = {}
-    # "pil" leaves 16-bit pictures as they are.
-    for sample in webdataset.WebDataset(shards, shardshuffle=False).decode("pil"):
-        rgb, depth, instance = (numpy.asarray(sample[name]) for name in ("rgb.png", "range.png", "instance.png"))
-        assert rgb.dtype == numpy.uint8 and rgb.shape[2] == 3, rgb.dtype
-        assert sample["rgb.png"].mode == "RGB" and sample["range.png"].mode.startswith("I"), sample["range.png"].mode
+    # Without a name of a picture decoder, pictures stay bytes; those of webdataset would make 8 bits of 16.
+    for sample in webdataset.WebDataset(shards, shardshuffle=False).decode():
+        pictures = [PIL.Image.open(io.BytesIO(sample[name])) for name in ("rgb.png", "range.png", "instance.png")]
+        assert [picture.mode[0] for picture in pictures] == ["R", "I", "I"], [picture.mode for picture in pictures]
+        rgb, depth, instance = (numpy.asarray(picture) for picture in pictures)
         assert rgb.shape[:2] == depth.shape == instance.shape
         found[sample["__key__"]] = {
             "size": [rgb.shape[1], rgb.shape[0]],

@@ -247,7 +247,8 @@ fn frames_of(plan: &Plan, parts: &[Part]) -> Vec<String> {
 
 fn send(sender: &SyncSender<Encoded>, frames: Vec<Encoded>) -> Result<()> {
     // The receiver is gone only when writing has failed, which the writing thread tells.
-    frames.into_iter().try_for_each(|frame| sender.send(frame)).map_err(|_| Error::Threads("the writing thread ended".into()))
+    let sent = |frame| sender.send(frame).map_err(|_| Error::Threads("the writing thread ended".into()));
+    frames.into_iter().try_for_each(sent)
 }
 
 /// A frame that waits to be written.
