@@ -3,8 +3,8 @@
 //! Pictures are rendered in groups ([`Renderer::render_batch`]). While one group is rendered, the one before it goes through the
 //! camera, its truth is found and its files are encoded and hashed, each picture on one thread of the pool; a thread of its own
 //! writes files that are done, in the frames' order. What is in memory at once does not grow with the set: two groups of
-//! panoramas (together 2 to 32 a thread, the fewer the larger they are), the encoded files of one group, at most
-//! [`QUEUE`] frames that wait to be written, the truth of one part, and the scene and home panorama of one condition. Only the
+//! panoramas (together 2 to 32 a thread, the fewer the larger they are), the encoded files of one group, at most eight
+//! frames that wait to be written, the truth of one part, and the scene and home panorama of one condition. Only the
 //! plan's poses grow with the set, some 50 bytes each.
 
 use std::io::Write;
@@ -80,7 +80,8 @@ struct Set<'a> {
 }
 
 impl Job<'_> {
-    /// Makes what is missing of the set. `watch` is called now and then and stops the work with `Break`.
+    /// Makes what is missing of the set. `watch` is called when the first scene is packed, then now and then; it stops the work with
+    /// `Break`.
     ///
     /// # Errors
     /// When the folder holds something else, there is not enough room on its disk, the renderer fails, a file cannot be written, or
@@ -104,6 +105,9 @@ impl Job<'_> {
         let all: usize = plan.parts.iter().filter(mine).map(|p| p.count).sum();
         let found = all - pending.iter().map(|p| p.count).sum::<usize>();
         let mut progress = Progress { done: found, all };
+        if watch(progress).is_break() {
+            return Err(Error::Interrupted);
+        }
         let mut ready = Some(first);
         let mut homes = Record::default();
         for (k, stage) in plan.stages.iter().enumerate() {
@@ -187,7 +191,7 @@ impl Job<'_> {
         let (sender, receiver) = sync_channel::<Encoded>(QUEUE);
         let writer = Writer { folder, document, layout };
         std::thread::scope(|scope| {
-            let writing = scope.spawn(move || writer.write_parts(parts, &frames_of(plan, parts), &receiver));
+            let writing = scope.spawn(move || writer.write_parts(parts, &condition_names(plan, parts), &receiver));
             let rendered = renderer.render_batch(&set.scene, &views, &mut |first, panoramas| {
                 if watch(*progress).is_break() {
                     return Err(Error::Interrupted);
@@ -241,7 +245,7 @@ impl Job<'_> {
     }
 }
 
-fn frames_of(plan: &Plan, parts: &[Part]) -> Vec<String> {
+fn condition_names(plan: &Plan, parts: &[Part]) -> Vec<String> {
     parts.iter().map(|p| plan.stages[p.stage].staged.condition.name()).collect()
 }
 

@@ -21,6 +21,8 @@ use crate::world::polygon::{bounds, contains_within};
 pub const PART_FRAMES: usize = 64;
 /// Most poses of a set.
 const MOST_SPOTS: usize = 10_000_000;
+/// Most beginnings of a grid that are tried along each axis.
+const MOST_BEGINS: usize = 40;
 /// Tries for each random place before the room is called too crowded.
 const TRIES: usize = 1000;
 /// Home lies on a place of the grid if it is as near as this, m.
@@ -402,22 +404,43 @@ fn lay_grid(
         let room = high - low;
         invalid("--grid", found, format!("what fits into the room of {:.2} x {:.2} m", room.x, room.y))
     };
+    let room = |lowest: Vector2<f64>| {
+        let inside = |i: usize, j: usize| {
+            contains_within(&world.outline, lowest + Vector2::new(j as f64, i as f64) * spacing_m, ON_PLACE_M)
+        };
+        let rim = [(0, 0), (0, columns - 1), (rows - 1, 0), (rows - 1, columns - 1)];
+        rim.into_iter().all(|(i, j)| inside(i, j)) && (0..rows).all(|i| (0..columns).all(|j| inside(i, j)))
+    };
     let lowest = match origin_m {
         Some([x, y]) => Vector2::new(x, y),
         None => {
-            // Of the grids with home on a place, the one whose middle is nearest to the room's; else the one in its middle.
-            let axis = |home: f64, low: f64, high: f64, count: usize| -> Option<f64> {
-                let middle = 0.5 * (low + high);
-                let fits = |k: &usize| home - *k as f64 * spacing_m >= low && home + (count - 1 - k) as f64 * spacing_m <= high;
-                let off = |k: usize| (home + (0.5 * (count - 1) as f64 - k as f64) * spacing_m - middle).abs();
-                let best = (0..count).filter(fits).min_by(|a, b| off(*a).total_cmp(&off(*b)));
-                let centred = middle - 0.5 * size(count);
-                best.map(|k| home - k as f64 * spacing_m).or((centred >= low).then_some(centred))
+            // Where the grid may begin along an axis: first with home on a place, the middle of the grid nearest to the room's
+            // first; at last about the room's middle.
+            let axis = |home: f64, low: f64, high: f64, count: usize| -> Vec<(f64, f64)> {
+                let centred = 0.5 * (low + high - size(count));
+                let fits = |begin: f64| begin >= low && begin + size(count) <= high;
+                let mut begins: Vec<(f64, f64)> = (0..count)
+                    .map(|k| home - k as f64 * spacing_m)
+                    .filter(|b| fits(*b))
+                    .map(|b| ((b - centred).abs(), b))
+                    .collect();
+                begins.sort_by(|a, b| a.0.total_cmp(&b.0));
+                begins.truncate(MOST_BEGINS);
+                if begins.is_empty() && fits(centred) {
+                    begins.push((0.0, centred));
+                }
+                begins
             };
             let home = world.home.position();
-            let x = axis(home.x, low.x, high.x, columns).ok_or_else(too_large)?;
-            let y = axis(home.y, low.y, high.y, rows).ok_or_else(too_large)?;
-            Vector2::new(x, y)
+            let (along_x, along_y) = (axis(home.x, low.x, high.x, columns), axis(home.y, low.y, high.y, rows));
+            let mut begins: Vec<(f64, Vector2<f64>)> = along_x
+                .iter()
+                .flat_map(|(dx, x)| along_y.iter().map(move |(dy, y)| (dx * dx + dy * dy, Vector2::new(*x, *y))))
+                .collect();
+            begins.sort_by(|a, b| a.0.total_cmp(&b.0));
+            let first = begins.first().ok_or_else(too_large)?.1;
+            // In a room with corners that reach in, the first that is all inside; where none is, the first tells what is not.
+            begins.iter().map(|(_, begin)| *begin).find(|begin| room(*begin)).unwrap_or(first)
         }
     };
     if lowest.x + size(columns) > high.x || lowest.y + size(rows) > high.y || lowest.x < low.x || lowest.y < low.y {
