@@ -11,10 +11,11 @@ use crate::error::{Error, Result};
 /// Ending of files that are still being written.
 pub const PARTIAL: &str = ".wayhome-partial";
 
-/// The name under which a file is written before it is whole.
+/// A name that no other process takes at the same time, on this machine or on another one that sees the folder.
 fn partial_name(path: &Path) -> PathBuf {
+    let since = std::time::UNIX_EPOCH.elapsed().unwrap_or_default();
     let mut name = path.file_name().unwrap_or_default().to_owned();
-    name.push(PARTIAL);
+    name.push(format!(".{:x}-{:x}{PARTIAL}", std::process::id(), since.as_nanos()));
     path.with_file_name(name)
 }
 

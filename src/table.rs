@@ -156,6 +156,16 @@ impl Table {
         Self::decode(bytes).map_err(|e| e.to_string())
     }
 
+    /// The notes in the key-value metadata of a Parquet file.
+    ///
+    /// # Errors
+    /// When it is none, or damaged.
+    pub fn notes_of_parquet(bytes: &[u8]) -> Result<Vec<(String, String)>, String> {
+        let reader = SerializedFileReader::new(bytes::Bytes::copy_from_slice(bytes)).map_err(|e| e.to_string())?;
+        let notes = reader.metadata().file_metadata().key_value_metadata().cloned().unwrap_or_default();
+        Ok(notes.into_iter().filter_map(|note| Some((note.key, note.value?))).collect())
+    }
+
     fn decode(bytes: Vec<u8>) -> Result<Self, ParquetError> {
         let reader = SerializedFileReader::new(bytes::Bytes::from(bytes))?;
         let schema = reader.metadata().file_metadata().schema().clone();
@@ -239,6 +249,7 @@ mod tests {
         let bytes = table.to_parquet(&[("study", "slip".to_owned())]).unwrap();
         assert_eq!(table.to_parquet(&[("study", "slip".to_owned())]).unwrap(), bytes);
         assert_eq!(Table::from_parquet(bytes.clone()).unwrap(), table);
+        assert_eq!(Table::notes_of_parquet(&bytes).unwrap(), [("study".to_owned(), "slip".to_owned())]);
         for cut in [0, 7, bytes.len() / 2, bytes.len() - 1] {
             assert!(Table::from_parquet(bytes[..cut].to_vec()).is_err(), "cut at {cut}");
         }

@@ -80,11 +80,12 @@ fn observability_gradients_are_those_of_the_printed_rates() {
     }
 }
 
-/// The order of Fig. 8 as the page states it, on the smaller set.
+/// The order of Fig. 8 as the page states it, on the smaller set: first in the mean with bearings from images. With exact bearings
+/// IBVS with a compass ties with it to the third decimal that the page prints.
 #[test]
 fn the_comparison_has_the_order_that_the_page_states() {
     let case = ImageCase::new(ImageSet::Vardy, None).unwrap();
-    for (source, slack) in [(Source::Images, 0.0), (Source::Points, 0.0)] {
+    for (source, slack) in [(Source::Images, 0.0), (Source::Points, 5e-4)] {
         let contest = contest(&case, source).unwrap();
         let ratio = |entrant| contest.row(entrant).unwrap().mean_ratio(&contest.straight_s);
         for law in LAWS {
@@ -98,12 +99,9 @@ fn the_comparison_has_the_order_that_the_page_states() {
             }
             assert_eq!(ratio(Entrant::PaperUntold(law)), None, "told nothing it does not come home");
         }
-        // Across laws the order turns with exact bearings; with those from images it depends on the extractor, and the page
-        // counts it.
-        if matches!(source, Source::Points) {
-            let across = ratio(Entrant::Vector(VectorLaw::Alv, Law::Lyapunov, Told::Compass)).unwrap();
-            assert!(across < ratio(Entrant::Paper(Law::Proportional)).unwrap(), "the law matters more than the method");
-        }
+        // Across laws it is not: one vector law with a compass and the nonlinear law beats its proportional one.
+        let across = ratio(Entrant::Vector(VectorLaw::Ibvs, Law::Lyapunov, Told::Compass)).unwrap();
+        assert!(across < ratio(Entrant::Paper(Law::Proportional)).unwrap(), "the law matters more than the method");
     }
     // Exact odometry from the true start needs no bearings.
     let claims = image_claims(&case);

@@ -84,6 +84,9 @@ pub enum Command {
     /// Success against conditions that worsen one at a time, as a table and a picture
     #[command(after_help = EXIT_CODES)]
     Robustness(Box<RobustnessArgs>),
+    /// Stress studies: Monte-Carlo sweeps over any settings, on one machine or many, and their report
+    #[command(after_help = super::sweep::HELP)]
+    Sweep(Box<super::sweep::SweepArgs>),
     /// Cramer-Rao bound of range, bearing and heading along a path, and the filter's errors beside it
     #[command(after_help = EXIT_CODES)]
     Bound(BoundArgs),
@@ -147,6 +150,11 @@ pub struct HomeArgs {
     /// Run all seeds from A to B, both included, in parallel and report on all of them together
     #[arg(long, value_name = "A..B", conflicts_with = "seed", value_parser = seeds)]
     pub seeds: Option<RangeInclusive<u64>>,
+    /// Run an episode of a study again, exactly: the study's folder and the episode's number in its rows
+    #[arg(long, value_name = "DIR:ROW", conflicts_with_all = ["world", "plant", "bearings", "method", "controller", "landmarks",
+        "renderer", "size", "light", "camera", "home_light", "home_camera", "start", "seed", "seeds", "initial_estimate",
+        "compass_deg", "time_limit_s", "noise_deg", "noise_dropout", "noise_false"], value_parser = super::sweep::row)]
+    pub replay: Option<(PathBuf, u64)>,
     /// Pose in the home frame at which a filter starts that has to be given one (paper-ekf): x,y,heading_deg
     #[arg(long, value_name = "x,y,heading_deg", allow_hyphen_values = true, value_parser = pose)]
     pub initial_estimate: Option<Pose>,

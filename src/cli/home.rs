@@ -1,15 +1,18 @@
 //! `wayhome home`: one closed-loop run, or one a seed.
 
 use std::ops::{ControlFlow, RangeInclusive};
+use std::path::Path;
 use std::sync::Mutex;
 
-use anyhow::Result;
+use anyhow::{Result, bail};
 use serde::Serialize;
 use wayhome::Error;
 use wayhome::episode::sensor::Noise;
 use wayhome::episode::{Bearings, Bench, Look, Outcome, Setup, Summary};
+use wayhome::report::sweep::StudyFolder;
 use wayhome::report::{OutputFolder, run as run_report, seeds as seeds_report, text};
 use wayhome::study::seeds::{SeedEvent, SeedsSummary, run_seeds};
+use wayhome::study::sweep::Row;
 use wayhome::vision::ExtractorSettings;
 use wayhome::world::World;
 
@@ -35,31 +38,56 @@ struct BatchOutput<'a> {
 }
 
 pub fn run(args: &HomeArgs, context: &Context) -> Result<Verdict> {
+    if let Some((folder, episode)) = &args.replay {
+        return replay(args, context, folder, *episode);
+    }
     let setup = setup(args)?;
     let world = World::open(&args.world)?;
     match &args.seeds {
         Some(seeds) => batch(args, context, &world, &setup, seeds),
-        None => single(args, context, &world, &setup),
+        None => {
+            let out = args.out.clone();
+            let out = out.unwrap_or_else(|| default_folder(&["home", &world.spec.name, &args.seed.to_string()]));
+            Ok(verdict(&single(context, &world, &setup, args.seed, &out)?))
+        }
     }
 }
 
-fn single(args: &HomeArgs, context: &Context, world: &World, setup: &Setup) -> Result<Verdict> {
-    let seed = args.seed.to_string();
-    let out = args.out.clone().unwrap_or_else(|| default_folder(&["home", &world.spec.name, &seed]));
-    setup.start_pose(world, wayhome::random::Seed(args.seed))?; // before a folder is made for a run that cannot start
-    let folder = OutputFolder::open(&out, "home", run_report::FILES)?;
+/// Runs an episode of a study again, and holds it against its row.
+fn replay(args: &HomeArgs, context: &Context, folder: &Path, episode: u64) -> Result<Verdict> {
+    let held = StudyFolder::open(folder)?;
+    let row = held.row(episode)?;
+    let study = held.study();
+    let (world, setup) = study.case(&row.values)?;
+    let out = args.out.clone();
+    let out = out.unwrap_or_else(|| default_folder(&["home", &study.name, &episode.to_string()]));
+    let summary = single(context, &world, &setup, row.seed, &out)?;
+    let again = Row::of(episode, row.cell, &row.values, &summary);
+    if again != row {
+        bail!("episode {episode} of {} did not run as its row says: another machine or build made it", folder.display());
+    }
+    Ok(verdict(&summary))
+}
+
+fn verdict(summary: &Summary) -> Verdict {
+    if summary.outcome == Outcome::Home { Verdict::Done } else { Verdict::NotHome }
+}
+
+fn single(context: &Context, world: &World, setup: &Setup, seed: u64, out: &Path) -> Result<Summary> {
+    setup.start_pose(world, wayhome::random::Seed(seed))?; // before a folder is made for a run that cannot start
+    let folder = OutputFolder::open(out, "home", run_report::FILES)?;
     let bar = context.progress(None)?;
-    let record = Bench::new(world, setup)?.run(args.seed, &mut |progress| {
+    let record = Bench::new(world, setup)?.run(seed, &mut |progress| {
         bar.set_message(format!("{:.1} s, {:.2} m from home", progress.time_s, progress.distance_m));
         bar.tick();
         if context.is_stopped() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     })?;
     bar.finish_and_clear();
-    let summary = Summary::new(&record, world, setup, args.seed);
+    let summary = Summary::new(&record, world, setup, seed);
     run_report::write(folder, world, &record, &summary)?;
     let output = RunOutput { summary: &summary, out: out.display().to_string() };
-    context.print(&output, || text::run(&summary, &out))?;
-    Ok(if summary.outcome == Outcome::Home { Verdict::Done } else { Verdict::NotHome })
+    context.print(&output, || text::run(&summary, out))?;
+    Ok(summary)
 }
 
 fn batch(args: &HomeArgs, context: &Context, world: &World, setup: &Setup, seeds: &RangeInclusive<u64>) -> Result<Verdict> {

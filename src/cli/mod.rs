@@ -16,6 +16,7 @@ mod render;
 mod render_report;
 mod reproduce;
 mod robustness;
+mod sweep;
 mod vision_report;
 mod world;
 
@@ -42,6 +43,7 @@ pub fn run(args: Args) -> Result<Verdict> {
         Command::Home(args) => home::run(&args, &context),
         Command::PhysicsReport(args) => physics_report::run(&args, &context),
         Command::Robustness(args) => robustness::run(&args, &context),
+        Command::Sweep(args) => sweep::run(&args, &context),
         Command::Bound(args) => bound::run(&args, &context),
         Command::Compare(args) => compare::run(&args, &context),
         Command::Observability(args) => observability::run(&args, &context),

@@ -54,11 +54,17 @@ pub enum LawKind {
     Lyapunov,
 }
 
-/// Builds a method. `initial` is the pose in the home frame that `paper-ekf` is started from; others must not get one.
+/// Builds a method. `filter` is for `anchored-ekf`; `initial` is the pose in the home frame that `paper-ekf` is started from; others must not get one.
 ///
 /// # Errors
 /// When the method needs more of the home snapshot than there is, or `initial` is given to a method that takes none.
-pub fn build(kind: MethodKind, law: LawKind, briefing: Briefing, initial: Option<Pose>) -> Result<Box<dyn Method>> {
+pub fn build(
+    kind: MethodKind,
+    law: LawKind,
+    filter: FilterSettings,
+    briefing: Briefing,
+    initial: Option<Pose>,
+) -> Result<Box<dyn Method>> {
     let law = match law {
         LawKind::Proportional => Law::Proportional,
         LawKind::Lyapunov => Law::Lyapunov,
@@ -81,7 +87,7 @@ pub fn build(kind: MethodKind, law: LawKind, briefing: Briefing, initial: Option
     }
     let vector = |law, briefing| Box::new(VectorHoming::new(law, controller, briefing));
     Ok(match kind {
-        MethodKind::AnchoredEkf => Box::new(AnchoredHoming::new(FilterSettings::default(), controller, &briefing)),
+        MethodKind::AnchoredEkf => Box::new(AnchoredHoming::new(filter, controller, &briefing)),
         MethodKind::PaperEkf => Box::new(PaperHoming::new(controller, briefing, initial)),
         MethodKind::Alv => vector(VectorLaw::Alv, briefing),
         MethodKind::TronDaniilidis => vector(VectorLaw::TronDaniilidis, briefing),
@@ -92,6 +98,8 @@ pub fn build(kind: MethodKind, law: LawKind, briefing: Briefing, initial: Option
 
 /// Home counts as reached within this share of the arrival radius, by the estimate.
 const STOP_SHARE: f64 = 0.25;
+/// ... or so near that braking at once ends there, within this share of the arrival radius ...
+const ROLL_SHARE: f64 = 0.8;
 /// ... if the position's standard deviation is within this share of the arrival radius.
 const STOP_SD_SHARE: f64 = 0.4;
 /// Creeping speed while the estimate is home but not yet sure, m/s.
@@ -131,7 +139,7 @@ impl AnchoredHoming {
         let range = estimate.range_m();
         // Braking from the speed last commanded takes this far; it may begin before home is reached.
         let rolling = self.speed_m_s * self.speed_m_s / (2.0 * self.max_acceleration_m_s2);
-        let near = range <= (STOP_SHARE * self.arrival_radius_m).max(rolling.min(0.5 * self.arrival_radius_m));
+        let near = range <= (STOP_SHARE * self.arrival_radius_m).max(rolling.min(ROLL_SHARE * self.arrival_radius_m));
         let passing = range <= 0.8 * self.arrival_radius_m && estimate.home_direction_rad().abs() > 1.4;
         if !(near || passing) {
             return (self.controller.drive(&estimate.pose), false);

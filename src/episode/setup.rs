@@ -13,6 +13,7 @@ use super::sensor::{
     RenderedSensor, Sensor, Sight,
 };
 use crate::error::{Error, Result};
+use crate::estimation::anchored::FilterSettings;
 use crate::geometry::Pose;
 use crate::observation::{Briefing, HomeSnapshot, RobotSheet, TaskSheet};
 use crate::panorama::Projection;
@@ -109,6 +110,8 @@ pub struct Setup {
     pub method: MethodKind,
     /// How it steers.
     pub law: LawKind,
+    /// Knobs of the anchored filter; the track is the robot's, whatever they say.
+    pub filter: FilterSettings,
     /// What renders, for [`Bearings::Rendered`].
     pub renderer: RendererChoice,
     /// Columns and rows of the panorama where they differ from the world's.
@@ -145,6 +148,7 @@ impl Default for Setup {
             bearings: Bearings::Rendered,
             method: MethodKind::AnchoredEkf,
             law: LawKind::Proportional,
+            filter: FilterSettings::default(),
             renderer: RendererChoice::Auto,
             size_px: None,
             extractor: ExtractorSettings::default(),
@@ -236,17 +240,27 @@ impl<'a> Bench<'a> {
             }
             Bearings::Ideal | Bearings::Noisy | Bearings::Dataset => None,
         };
-        let dataset = match (setup.bearings, &setup.dataset) {
-            (Bearings::Dataset, Some(choice)) => Some(Arc::new(DatasetField::new(world, choice)?)),
-            (Bearings::Dataset, None) => {
-                return Err(Error::Invalid {
-                    what: "set for --bearings dataset".into(),
-                    found: "none".into(),
-                    allowed: "the folder of one, with `home --dataset DIR`".into(),
-                });
-            }
-            _ => None,
+        let dataset = field(world, setup)?;
+        Ok(Self { world, setup, camera, dataset })
+    }
+
+    /// The packed world as it was at home and as it is on the way; `None` for a sensor without a camera.
+    #[must_use]
+    pub fn scenes(&self) -> Option<[Arc<Scene>; 2]> {
+        self.camera.as_ref().map(|camera| camera.scenes.clone())
+    }
+
+    /// As [`Bench::new`], with the scenes of another bench on an equal world with the same [`Setup::looks`]: packing a world, its
+    /// textures above all, takes longer than a short run.
+    ///
+    /// # Errors
+    /// When the renderer cannot be had, or the set cannot be opened.
+    pub fn with_scenes(world: &'a World, setup: &'a Setup, scenes: [Arc<Scene>; 2]) -> Result<Self> {
+        let camera = match setup.bearings {
+            Bearings::Rendered => Some(Camera { scenes, renderer: render::create(setup.renderer)? }),
+            Bearings::Ideal | Bearings::Noisy | Bearings::Dataset => None,
         };
+        let dataset = field(world, setup)?;
         Ok(Self { world, setup, camera, dataset })
     }
 
@@ -286,7 +300,7 @@ impl<'a> Bench<'a> {
         let task = setup.task(world);
         let briefing = setup.briefing(world, sensor.home().clone());
         let initial = if setup.told_start { Some(world.home.to_local(&start)) } else { setup.initial_estimate };
-        let mut method = method::build(setup.method, setup.law, briefing, initial)?;
+        let mut method = method::build(setup.method, setup.law, setup.filter, briefing, initial)?;
         let parts = Parts { plant: plant.as_mut(), sensor: sensor.as_mut(), method: method.as_mut() };
         run(parts, world.home, &task, watch)
     }
@@ -319,6 +333,19 @@ impl<'a> Bench<'a> {
             sensor = Box::new(CompassSensor::new(sensor, world.home, sd_rad, seed)?);
         }
         Ok(sensor)
+    }
+}
+
+/// The set that bearings come from, where they come from one.
+fn field(world: &World, setup: &Setup) -> Result<Option<Arc<DatasetField>>> {
+    match (setup.bearings, &setup.dataset) {
+        (Bearings::Dataset, Some(choice)) => Ok(Some(Arc::new(DatasetField::new(world, choice)?))),
+        (Bearings::Dataset, None) => Err(Error::Invalid {
+            what: "set for --bearings dataset".into(),
+            found: "none".into(),
+            allowed: "the folder of one, with `home --dataset DIR`".into(),
+        }),
+        _ => Ok(None),
     }
 }
 

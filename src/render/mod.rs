@@ -24,6 +24,7 @@ mod cpu;
 mod frame;
 mod gpu;
 mod hits;
+mod huge_pages;
 mod instructions;
 mod sample;
 mod scene;

@@ -6,6 +6,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use bytemuck::{Pod, Zeroable};
 use rayon::prelude::*;
 
+use super::huge_pages;
 use super::texture;
 use crate::error::Result;
 use crate::geometry::Vector2;
@@ -232,7 +233,7 @@ fn pack(surfaces: &[Surface<'_>]) -> (Vec<Material>, Vec<u32>) {
         .collect();
     let sizes = texture::log2_sizes(distinct.iter().map(|s| s.texture));
     let baked: Vec<texture::Baked> = distinct.par_iter().zip(sizes).map(|(s, n)| texture::bake(s, n)).collect();
-    let mut atlas = Vec::with_capacity(baked.iter().map(|b| b.texels.len()).sum::<usize>() + PADDING);
+    let mut atlas = huge_pages::with_capacity(baked.iter().map(|b| b.texels.len()).sum::<usize>() + PADDING);
     let packed: Vec<Material> = baked
         .iter()
         .zip(&distinct)

@@ -13,7 +13,7 @@ pub fn table(bound: &Bound, every_s: f64) -> String {
     let [first, last] = bound.seeds;
     let mut text = format!(
         "{}, path of seed {}, bearings {:.2} deg, odometry {:.1} %, filter with seeds {first}..{last}\n\n\
-         {:>6} {:>7}  {:>24}  {:>5} {:>24}  {:>17}  {:>5}\n{:>6} {:>7}  {:>8}{:>8}{:>8}  {:>5} {:>8}{:>8}{:>8}  {:>5} {:>5} {:>5}  {:>5}\n",
+         {:>6} {:>7}  {:>24}  {:>5} {:>24}  {:>17}  {:>5} {:>5}\n{:>6} {:>7}  {:>8}{:>8}{:>8}  {:>5} {:>8}{:>8}{:>8}  {:>5} {:>5} {:>5}  {:>5} {:>5}\n",
         bound.world,
         bound.path_seed,
         bound.bearing_sd_rad.to_degrees(),
@@ -24,6 +24,7 @@ pub fn table(bound: &Bound, every_s: f64) -> String {
         "",
         "RMSE of the filter",
         "RMSE / least sd",
+        "",
         "",
         "t s",
         "m",
@@ -37,7 +38,8 @@ pub fn table(bound: &Bound, every_s: f64) -> String {
         "R",
         "th",
         "al",
-        "NEES"
+        "NEES",
+        "NIS"
     );
     let mut next_s = 0.0;
     for (k, row) in bound.rows.iter().enumerate() {
@@ -46,7 +48,25 @@ pub fn table(bound: &Bound, every_s: f64) -> String {
             next_s = row.time_s + every_s;
         }
     }
+    text += &consistency(bound);
     text
+}
+
+/// How often NEES and NIS lie where a consistent filter's would, once all runs have an estimate.
+fn consistency(bound: &Bound) -> String {
+    let [first, last] = bound.seeds;
+    let all = (last - first + 1) as usize;
+    let settled: Vec<&BoundRow> = bound.rows.iter().filter(|row| row.runs == all).collect();
+    let Some(row) = settled.last() else { return String::new() };
+    let within = |value: Option<f64>, [low, high]: [f64; 2]| value.is_some_and(|v| (low..=high).contains(&v));
+    let nees = settled.iter().filter(|row| within(row.nees, row.nees_band())).count();
+    let nis = settled.iter().filter(|row| within(row.nis, row.nis_band())).count();
+    let ([a, b], [c, d]) = (row.nees_band(), row.nis_band());
+    format!(
+        "\n95 % bands of a consistent filter over {all} runs: NEES {a:.2} to {b:.2}, NIS a bearing {c:.3} to {d:.3} at the end.\n\
+         Of {} steps after all runs have an estimate, NEES is in its band in {nees}, NIS in {nis}.\n",
+        settled.len()
+    )
 }
 
 fn line(row: &BoundRow) -> String {
@@ -64,6 +84,6 @@ fn line(row: &BoundRow) -> String {
         let _ = write!(text, "{:>8}", number(rmse.map(|e| unit * e[k])));
     }
     let ratio = |k: usize| number(rmse.and_then(|e| Some(e[k] / shown(k)?)));
-    let _ = writeln!(text, "  {:>5} {:>5} {:>5}  {:>5}", ratio(0), ratio(1), ratio(2), number(row.nees));
+    let _ = writeln!(text, "  {:>5} {:>5} {:>5}  {:>5} {:>5}", ratio(0), ratio(1), ratio(2), number(row.nees), number(row.nis));
     text
 }

@@ -33,8 +33,8 @@ const PLOT_PX: [f64; 4] = [78.0, 50.0, 560.0, 382.0];
 /// Where the legend begins, px.
 const LEGEND_PX: f64 = 584.0;
 
-const INK: &str = "#1a1a1a";
-const FAINT_INK: &str = "#6b6b6b";
+pub(super) const INK: &str = "#1a1a1a";
+pub(super) const FAINT_INK: &str = "#6b6b6b";
 
 /// Colours that people with any colour vision tell apart (Okabe and Ito 2008), for series in order.
 pub const SERIES: [&str; 6] = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9"];
@@ -323,25 +323,25 @@ fn wrapped(text: &str, most: usize) -> Vec<String> {
 }
 
 /// A length with two decimals, without a needless tail.
-fn px(value: f64) -> String {
+pub(super) fn px(value: f64) -> String {
     let text = format!("{value:.2}");
     let text = text.trim_end_matches('0').trim_end_matches('.');
     if text == "-0" { "0".to_owned() } else { text.to_owned() }
 }
 
-fn text(content: &str, x: f64, y: f64, size_px: f64) -> Text {
+pub(super) fn text(content: &str, x: f64, y: f64, size_px: f64) -> Text {
     Text::new(content).set("x", px(x)).set("y", px(y)).set("font-size", px(size_px))
 }
 
-fn line(a: [f64; 2], b: [f64; 2]) -> Line {
+pub(super) fn line(a: [f64; 2], b: [f64; 2]) -> Line {
     Line::new().set("x1", px(a[0])).set("y1", px(a[1])).set("x2", px(b[0])).set("y2", px(b[1]))
 }
 
-fn rectangle([left, top, right, bottom]: [f64; 4]) -> Rectangle {
+pub(super) fn rectangle([left, top, right, bottom]: [f64; 4]) -> Rectangle {
     Rectangle::new().set("x", px(left)).set("y", px(top)).set("width", px(right - left)).set("height", px(bottom - top))
 }
 
-fn disc(at: [f64; 2], mark: &Mark) -> Circle {
+pub(super) fn disc(at: [f64; 2], mark: &Mark) -> Circle {
     Circle::new()
         .set("cx", px(at[0]))
         .set("cy", px(at[1]))
@@ -352,7 +352,7 @@ fn disc(at: [f64; 2], mark: &Mark) -> Circle {
 }
 
 /// Sets a shape's line.
-fn stroked<N: svg::Node>(mut shape: N, stroke: &Stroke) -> N {
+pub(super) fn stroked<N: svg::Node>(mut shape: N, stroke: &Stroke) -> N {
     shape.assign("stroke", stroke.colour);
     shape.assign("stroke-width", px(stroke.width_px));
     if !stroke.dashes.is_empty() {

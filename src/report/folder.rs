@@ -9,7 +9,7 @@ use crate::error::{Error, Result};
 use crate::storage::{self, PARTIAL, io_error, write_atomically};
 
 /// File that marks a folder as ours; it holds the name of the verb that writes it.
-const MARKER: &str = ".wayhome";
+pub(super) const MARKER: &str = ".wayhome";
 
 /// A folder of results that one verb of the program writes.
 ///
@@ -24,7 +24,7 @@ pub struct OutputFolder {
 
 impl OutputFolder {
     /// Opens or creates the folder for `verb`, which writes files of the given names. A `#` in a name stands for any number:
-    /// `frame-#.png`.
+    /// `frame-#.png`; a `*` before it for any beginning: `*.svg`.
     ///
     /// # Errors
     /// When the folder cannot be created or read, or holds what `verb` has not written.
@@ -105,7 +105,7 @@ impl OutputFolder {
 }
 
 /// Names of what is in a folder, sorted.
-fn files(path: &Path) -> Result<Vec<String>> {
+pub(super) fn files(path: &Path) -> Result<Vec<String>> {
     let mut names = Vec::new();
     for entry in fs::read_dir(path).map_err(io_error("read folder", path))? {
         names.push(entry.map_err(io_error("read folder", path))?.file_name().to_string_lossy().into_owned());
@@ -116,13 +116,20 @@ fn files(path: &Path) -> Result<Vec<String>> {
 
 /// Whether a file's name is one of `names`.
 fn is_announced(names: &[&str], file: &str) -> bool {
-    names.iter().any(|name| match name.split_once('#') {
-        None => *name == file,
+    names.iter().any(|name| match name.strip_prefix('*') {
+        Some(ending) => file.ends_with(ending),
+        None => is_numbered(name, file),
+    })
+}
+
+fn is_numbered(name: &str, file: &str) -> bool {
+    match name.split_once('#') {
+        None => name == file,
         Some((before, after)) => {
             let number = file.strip_prefix(before).and_then(|rest| rest.strip_suffix(after));
             number.is_some_and(|n| !n.is_empty() && n.bytes().all(|b| b.is_ascii_digit()))
         }
-    })
+    }
 }
 
 /// A file that is being written piece by piece, so that nobody has to hold all of it; see [`OutputFolder::begin`].
@@ -143,7 +150,7 @@ impl GrowingFile {
     }
 }
 
-fn remove(path: &Path) -> Result<()> {
+pub(super) fn remove(path: &Path) -> Result<()> {
     match fs::remove_file(path) {
         Err(source) if source.kind() != io::ErrorKind::NotFound => {
             Err(Error::Io { action: "remove", path: path.to_owned(), source })

@@ -19,6 +19,7 @@ pub mod robustness;
 pub mod run;
 pub mod seeds;
 pub mod sheet;
+pub mod sweep;
 pub mod text;
 pub mod vision;
 

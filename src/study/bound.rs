@@ -18,6 +18,7 @@ use nalgebra::Vector3;
 use rayon::prelude::*;
 use serde::Serialize;
 
+use super::statistics::chi_square_95;
 use crate::episode::method::{self, LawKind, MethodKind};
 use crate::episode::sensor::{IdealSensor, Noise, NoisySensor, Sensor};
 use crate::episode::{BeliefError, Parts, PlantKind, Setup, Start, run};
@@ -131,6 +132,10 @@ pub struct BoundRow {
     pub rmse: Option<PolarErrors>,
     /// Their mean normalised estimation error squared of (x, y, heading); 3 for a consistent filter.
     pub nees: Option<f64>,
+    /// Their normalised innovation squared, a bearing: 1 for a consistent filter; `None` without bearings.
+    pub nis: Option<f64>,
+    /// Bearings that the latter is of.
+    pub bearings: usize,
 }
 
 impl BoundRow {
@@ -139,6 +144,25 @@ impl BoundRow {
     pub fn ratio(&self) -> Option<[f64; 3]> {
         Some(self.rmse?.over(&self.bound?))
     }
+
+    /// 95 % interval in which the mean NEES of a consistent filter falls.
+    #[must_use]
+    pub fn nees_band(&self) -> [f64; 2] {
+        chi_square_95(3.0 * self.runs as f64).map(|bound| bound / self.runs as f64)
+    }
+
+    /// 95 % interval in which the NIS a bearing of a consistent filter falls.
+    #[must_use]
+    pub fn nis_band(&self) -> [f64; 2] {
+        chi_square_95(self.bearings as f64).map(|bound| bound / self.bearings as f64)
+    }
+}
+
+/// What a run of the filter makes of a step.
+struct StepErrors {
+    belief: BeliefError,
+    nis: f64,
+    bearings: usize,
 }
 
 /// The bound along a path and the filter beside it.
@@ -175,7 +199,7 @@ pub fn bound(
 ) -> Result<Bound> {
     settings.check(world)?;
     let path = Path::drive(world, settings)?;
-    let runs: Vec<Vec<Option<BeliefError>>> = seeds
+    let runs: Vec<Vec<Option<StepErrors>>> = seeds
         .clone()
         .collect::<Vec<u64>>()
         .into_par_iter()
@@ -187,7 +211,10 @@ pub fn bound(
     let bounds = path.bounds(world, settings)?;
     let rows = (0..path.steps.len())
         .map(|k| {
-            let errors: Vec<&BeliefError> = runs.iter().filter_map(|run| run[k].as_ref()).collect();
+            let of_step = || runs.iter().filter_map(|run| run[k].as_ref());
+            let errors: Vec<&BeliefError> = of_step().map(|step| &step.belief).collect();
+            let bearings: usize = of_step().map(|step| step.bearings).sum();
+            let nis: f64 = of_step().map(|step| step.nis).sum();
             let mean = |of: &dyn Fn(&BeliefError) -> f64| errors.iter().map(|e| of(e)).sum::<f64>() / errors.len() as f64;
             let rmse = |of: &dyn Fn(&BeliefError) -> f64| mean(&|e| of(e) * of(e)).sqrt();
             let some = !errors.is_empty();
@@ -202,6 +229,8 @@ pub fn bound(
                     heading_rad: rmse(&|e| e.heading_rad),
                 }),
                 nees: some.then(|| mean(&|e| e.nees.unwrap_or(f64::INFINITY))),
+                nis: (bearings > 0).then(|| nis / bearings as f64),
+                bearings,
             }
         })
         .collect();
@@ -246,7 +275,8 @@ impl Path {
             bodies: Vec::new(),
         };
         let briefing = setup.briefing(world, sensor.home().clone());
-        let mut method = method::build(MethodKind::AnchoredEkf, LawKind::Proportional, briefing, None)?;
+        let mut method =
+            method::build(MethodKind::AnchoredEkf, LawKind::Proportional, FilterSettings::default(), briefing, None)?;
         let task = setup.task(world);
         let parts = Parts { plant: &mut plant, sensor: &mut sensor, method: method.as_mut() };
         let record = run(parts, world.home, &task, &mut |_| ControlFlow::Continue(()))?;
@@ -332,7 +362,7 @@ impl Path {
     }
 
     /// The filter's errors along the path, one a step where it has an estimate.
-    fn estimate(&self, world: &World, settings: &BoundSettings, seed: Seed) -> Result<Vec<Option<BeliefError>>> {
+    fn estimate(&self, world: &World, settings: &BoundSettings, seed: Seed) -> Result<Vec<Option<StepErrors>>> {
         let seed = seed.derive("bound");
         let mut straying = seed.stream("straying");
         let mut sensor = NoisySensor::new(IdealSensor::new(world), world.landmark_count, settings.noise(), seed);
@@ -346,8 +376,12 @@ impl Path {
                 if step.odometry.dt_s > 0.0 {
                     truth = truth.compose(&strayed(&motion, &mut straying));
                 }
-                filter.step(&step.odometry, &sensor.observe(truth, &step.bodies)?);
-                Ok(filter.estimate().map(|estimate| BeliefError::new(&estimate, &self.home.to_local(&truth))))
+                let report = filter.step(&step.odometry, &sensor.observe(truth, &step.bodies)?);
+                Ok(filter.estimate().map(|estimate| StepErrors {
+                    belief: BeliefError::new(&estimate, &self.home.to_local(&truth)),
+                    nis: report.nis,
+                    bearings: report.matched,
+                }))
             })
             .collect()
     }

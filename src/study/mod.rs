@@ -11,4 +11,5 @@ pub mod render;
 pub mod robustness;
 pub mod seeds;
 pub mod statistics;
+pub mod sweep;
 pub mod vision;

@@ -14,7 +14,7 @@ use crate::error::{Error, Result};
 
 /// A value and where it begins.
 #[derive(Debug, Clone)]
-pub(super) struct Node {
+pub(crate) struct Node {
     /// Line, from 1, where the format tells.
     pub line: Option<usize>,
     pub value: Value,
@@ -22,7 +22,7 @@ pub(super) struct Node {
 
 /// What a file can hold.
 #[derive(Debug, Clone)]
-pub(super) enum Value {
+pub(crate) enum Value {
     Null,
     Bool(bool),
     Integer(i128),
@@ -36,7 +36,7 @@ pub(super) enum Value {
 
 impl Node {
     /// Parses TOML.
-    pub(super) fn from_toml(text: &str, path: &Path) -> Result<Self> {
+    pub(crate) fn from_toml(text: &str, path: &Path) -> Result<Self> {
         let (table, errors) = DeTable::parse_recoverable(text);
         if !errors.is_empty() {
             let message = errors.iter().map(|e| e.to_string().trim_end().to_owned()).collect::<Vec<_>>().join("\n");
@@ -49,14 +49,14 @@ impl Node {
     }
 
     /// Parses JSON. Values don't know their lines.
-    pub(super) fn from_json(text: &str, path: &Path) -> Result<Self> {
+    pub(crate) fn from_json(text: &str, path: &Path) -> Result<Self> {
         let value: serde_json::Value =
             serde_json::from_str(text).map_err(|e| Error::Parse { path: path.to_owned(), message: e.to_string() })?;
         Ok(Self::from_json_value(value))
     }
 
     /// A tree from anything that serialises; non-finite numbers survive, which JSON has no way to write.
-    pub(super) fn from_spec(spec: &impl serde::Serialize) -> std::result::Result<Self, toml::ser::Error> {
+    pub(crate) fn from_spec(spec: &impl serde::Serialize) -> std::result::Result<Self, toml::ser::Error> {
         fn convert(value: toml::Value) -> Node {
             let value = match value {
                 toml::Value::String(s) => Value::Text(s),
@@ -90,7 +90,7 @@ impl Node {
 
     /// Line and owner of a field given as `landmarks[2].shape.disc`: the line of the nearest node on the way that has one, and
     /// the `name` of the innermost list entry on the way that has one.
-    pub(super) fn locate(&self, place: &str) -> (Option<usize>, Option<String>) {
+    pub(crate) fn locate(&self, place: &str) -> (Option<usize>, Option<String>) {
         let (mut node, mut line, mut owner) = (self, None, None);
         for step in place.split(['.', '[']) {
             let next = match (&node.value, step.strip_suffix(']').and_then(|index| index.parse::<usize>().ok())) {
@@ -109,7 +109,7 @@ impl Node {
     }
 
     /// Entry of a table.
-    pub(super) fn get(&self, key: &str) -> Option<&Self> {
+    pub(crate) fn get(&self, key: &str) -> Option<&Self> {
         match &self.value {
             Value::Table(entries) => entries.iter().find(|(k, _)| k == key).map(|(_, node)| node),
             _ => None,
@@ -117,7 +117,7 @@ impl Node {
     }
 
     /// Adds to the table at `path`, which is made where it is missing, the entries of `defaults` that it does not have.
-    pub(super) fn fill(&mut self, path: &[&str], defaults: Self) {
+    pub(crate) fn fill(&mut self, path: &[&str], defaults: Self) {
         let Value::Table(entries) = &mut self.value else { return };
         let Some((key, rest)) = path.split_first() else {
             if let Value::Table(defaults) = defaults.value {
@@ -137,7 +137,7 @@ impl Node {
         }
     }
 
-    pub(super) fn text(&self) -> Option<&str> {
+    pub(crate) fn text(&self) -> Option<&str> {
         match &self.value {
             Value::Text(text) => Some(text),
             _ => None,
@@ -145,7 +145,7 @@ impl Node {
     }
 
     /// The value in a few words, for a message.
-    pub(super) fn describe(&self) -> String {
+    pub(crate) fn describe(&self) -> String {
         match &self.value {
             Value::Null => "null".to_owned(),
             Value::Bool(b) => b.to_string(),

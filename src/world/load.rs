@@ -1,6 +1,6 @@
 //! Reading a world file and resolving it into a [`World`].
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 use sha2::{Digest, Sha256};
@@ -47,20 +47,8 @@ impl World {
     /// # Errors
     /// When there is neither, and as [`World::load`].
     pub fn open(argument: &str) -> Result<Self> {
-        let path = Path::new(argument);
-        if path.is_file() {
-            return Self::load(path);
-        }
-        let bare = argument.strip_prefix("worlds/").unwrap_or(argument);
-        let bare = bare.strip_suffix(".toml").unwrap_or(bare);
-        match BUILTIN.iter().find(|(name, _)| *name == bare) {
-            Some((name, text)) => Self::from_toml(text, format!("{BUILTIN_SOURCE}{name}")),
-            None => Err(Error::Invalid {
-                what: "world".to_owned(),
-                found: format!("{argument}, which is no file"),
-                allowed: format!("a world file (TOML or JSON), or a built-in world: {}", Self::builtin_names().join(", ")),
-            }),
-        }
+        let (text, source) = read(argument)?;
+        Self::parse(&text, &source)
     }
 
     /// Names of the built-in worlds.
@@ -74,12 +62,15 @@ impl World {
     /// # Errors
     /// When the file cannot be read, is not of its format, or has faults; all faults come at once.
     pub fn load(path: &Path) -> Result<Self> {
-        let text =
-            std::fs::read_to_string(path).map_err(|source| Error::Io { action: "read", path: path.to_owned(), source })?;
-        if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("json")) {
-            Self::from_json(&text, path)
+        Self::parse(&read_file(path)?, path)
+    }
+
+    /// Checks a text of the format that the source's name tells.
+    fn parse(text: &str, source: &Path) -> Result<Self> {
+        if source.extension().is_some_and(|e| e.eq_ignore_ascii_case("json")) {
+            Self::from_json(text, source)
         } else {
-            Self::from_toml(&text, path)
+            Self::from_toml(text, source)
         }
     }
 
@@ -87,6 +78,12 @@ impl World {
     #[must_use]
     pub fn json_schema() -> serde_json::Value {
         schemars::schema_for!(WorldSpec).to_value()
+    }
+
+    /// Places of all fields of a world file: `floor.friction`, `obstacles[].height_m`.
+    #[must_use]
+    pub fn field_names() -> Vec<String> {
+        structure::places(&Self::json_schema())
     }
 
     /// Checks a world given as TOML text. `source` names it in messages; images are looked for in its folder.
@@ -117,7 +114,7 @@ impl World {
         Self::from_tree(tree, source.as_ref(), &json)
     }
 
-    fn from_tree(mut tree: Node, path: &Path, text: &str) -> Result<Self> {
+    pub(super) fn from_tree(mut tree: Node, path: &Path, text: &str) -> Result<Self> {
         let as_read = tree.clone(); // the check below removes unknown fields, whose lines are still wanted
         let Findings { unknown, not_finite, unreadable } = structure::check(&mut tree, &Self::json_schema());
         let mut faults = unknown;
@@ -217,6 +214,29 @@ impl World {
             sha256,
             spec,
         }
+    }
+}
+
+fn read_file(path: &Path) -> Result<String> {
+    std::fs::read_to_string(path).map_err(|source| Error::Io { action: "read", path: path.to_owned(), source })
+}
+
+/// Text and source of the world that a person named: the path of a file if there is one, else the name of a built-in world, as
+/// `NAME` or `worlds/NAME.toml`.
+pub(super) fn read(argument: &str) -> Result<(String, PathBuf)> {
+    let path = Path::new(argument);
+    if path.is_file() {
+        return Ok((read_file(path)?, path.to_owned()));
+    }
+    let bare = argument.strip_prefix("worlds/").unwrap_or(argument);
+    let bare = bare.strip_suffix(".toml").unwrap_or(bare);
+    match BUILTIN.iter().find(|(name, _)| *name == bare) {
+        Some((name, text)) => Ok(((*text).to_owned(), PathBuf::from(format!("{BUILTIN_SOURCE}{name}")))),
+        None => Err(Error::Invalid {
+            what: "world".to_owned(),
+            found: format!("{argument}, which is no file"),
+            allowed: format!("a world file (TOML or JSON), or a built-in world: {}", World::builtin_names().join(", ")),
+        }),
     }
 }
 

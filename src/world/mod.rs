@@ -7,7 +7,8 @@
 
 mod camera;
 pub mod convex;
-mod document;
+pub(crate) mod document;
+mod draft;
 mod free;
 mod light;
 mod load;
@@ -24,6 +25,7 @@ use std::path::PathBuf;
 use crate::geometry::{Pose, Vector2};
 use crate::panorama::{INSTANCE_CEILING, INSTANCE_FIRST_WALL, INSTANCE_FLOOR, Projection};
 pub use camera::{CameraPreset, OpticsSpec};
+pub use draft::Draft;
 pub use light::LightPreset;
 pub use picture::Picture;
 pub use robot::RobotSpec;

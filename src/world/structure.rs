@@ -44,6 +44,28 @@ pub(super) fn check(file: &mut Node, schema: &Json) -> Findings {
     walk.findings
 }
 
+/// Places of all fields of the world format, in the order of the schema; `[]` stands for an entry of a list.
+pub(super) fn places(schema: &Json) -> Vec<String> {
+    fn walk(schema: &Json, definitions: Option<&Json>, place: &str, found: &mut Vec<String>) {
+        let named = schema.get("$ref").and_then(Json::as_str).and_then(|r| r.strip_prefix("#/$defs/"));
+        let schema = named.and_then(|name| definitions?.get(name)).unwrap_or(schema);
+        for alternative in ["oneOf", "anyOf"].iter().filter_map(|key| schema.get(key)?.as_array()).flatten() {
+            walk(alternative, definitions, place, found);
+        }
+        for (key, field) in schema.get("properties").and_then(Json::as_object).into_iter().flatten() {
+            let place = if place.is_empty() { key.clone() } else { format!("{place}.{key}") };
+            found.push(place.clone());
+            walk(field, definitions, &place, found);
+        }
+        if let Some(item) = schema.get("items") {
+            walk(item, definitions, &format!("{place}[]"), found);
+        }
+    }
+    let mut found = Vec::new();
+    walk(schema, schema.get("$defs"), "", &mut found);
+    found
+}
+
 struct Walk<'s> {
     definitions: Option<&'s Json>,
     findings: Findings,

@@ -5,6 +5,7 @@ use crate::control::printed::PrintedLaw;
 use crate::control::vectors::{VectorLaw, align};
 use crate::episode::method::{self, LawKind, MethodKind};
 use crate::error::Result;
+use crate::estimation::anchored::FilterSettings;
 use crate::estimation::paper::{PaperEkf, PaperSettings};
 use crate::geometry::{Pose, Twist, angle_of, sin_cos, wrap};
 use crate::observation::{
@@ -187,7 +188,7 @@ pub fn anchored(law: Law, terms: &Terms, home: &HomeSnapshot) -> Result<Box<dyn 
         max_acceleration_m_s2: 10.0,
     };
     let task = TaskSheet { speed_m_s: terms.speed_m_s, control_period_s: terms.period_s, arrival_radius_m: terms.radius_m };
-    method::build(MethodKind::AnchoredEkf, law, Briefing { home: home.clone(), robot, task }, None)
+    method::build(MethodKind::AnchoredEkf, law, FilterSettings::default(), Briefing { home: home.clone(), robot, task }, None)
 }
 
 /// A homing vector at constant speed, steered by the same two laws: proportionally to the angle between heading and vector,

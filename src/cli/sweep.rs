@@ -1,0 +1,306 @@
+//! `wayhome sweep`: stress studies, their shards, and their report.
+
+use std::fmt::Write;
+use std::ops::{ControlFlow, RangeInclusive};
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+use std::time::Instant;
+
+use anyhow::Result;
+use serde::Serialize;
+use wayhome::Error;
+use wayhome::report::sweep::{self as page, Rate, StudyFolder};
+use wayhome::study::statistics::wilson_95;
+use wayhome::study::sweep::{Row, Study, catalogue, run as run_chunks};
+
+use super::Verdict;
+use super::args::seeds;
+use super::context::{Context, default_folder, print};
+
+/// Shown under `sweep --help`.
+pub const HELP: &str =
+    "A study file names a world, settings, axes and seeds; worlds/studies/ has some, which go by their names too.
+The same command goes on where a killed one was. The rows in rows.parquet depend on the study alone.
+
+Shards: --shard 2/8 runs every eighth chunk from the second on. Without --shard, an array job of Slurm is a shard by
+SLURM_ARRAY_TASK_ID and SLURM_ARRAY_TASK_COUNT, and an indexed job of Kubernetes one by JOB_COMPLETION_INDEX and
+WAYHOME_SHARDS. Shards may share one folder, or have one each for `sweep merge`.
+
+Exit codes:
+  0    done
+  1    failed: a file or a folder, or a row that is missing
+  2    usage: an argument, or a folder of another study
+  130  interrupted by Ctrl-C; finished chunks are kept";
+
+/// Arguments of `sweep`.
+#[derive(Debug, clap::Args)]
+#[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
+pub struct SweepArgs {
+    #[command(subcommand)]
+    pub command: Option<SweepCommand>,
+    /// Study file, or the name of a built-in study
+    #[arg(required_unless_present = "settings")]
+    pub study: Option<String>,
+    /// Run these seeds in each cell instead of the study's, both included
+    #[arg(long, value_name = "A..B", value_parser = seeds)]
+    pub seeds: Option<RangeInclusive<u64>>,
+    /// Run only shard i of n, from 1/n to n/n
+    #[arg(long, value_name = "i/n", value_parser = shard)]
+    pub shard: Option<[u64; 2]>,
+    /// Keep summary, trajectory, path and panoramas of the runs that do not come home
+    #[arg(long)]
+    pub keep_failures: bool,
+    /// Folder for the rows; one that holds rows of the same study is gone on with [default: results/runs/sweep-STUDY]
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// List all settings that a study can vary, and leave
+    #[arg(long, conflicts_with_all = ["study", "seeds", "shard", "keep_failures", "out"])]
+    pub settings: bool,
+}
+
+/// The subcommands of `sweep`.
+#[derive(Debug, clap::Subcommand)]
+pub enum SweepCommand {
+    /// Put the rows of shards together
+    Merge {
+        /// Folders of shards of one study
+        #[arg(required = true, value_name = "DIR")]
+        shards: Vec<PathBuf>,
+        /// Folder for all rows
+        #[arg(long, value_name = "DIR")]
+        out: PathBuf,
+    },
+    /// Make the page of a study: heat maps, curves, paired differences, failures, settings
+    Report {
+        /// Folder of a complete study
+        #[arg(value_name = "DIR")]
+        study: PathBuf,
+        /// Folder for the page, its figures and tables [default: DIR/report]
+        #[arg(long, value_name = "DIR")]
+        out: Option<PathBuf>,
+    },
+}
+
+/// `DIR:ROW`.
+pub fn row(text: &str) -> Result<(PathBuf, u64), String> {
+    let parts = text.rsplit_once(':').and_then(|(folder, row)| Some((folder, row.parse().ok()?)));
+    let (folder, row) =
+        parts.filter(|(folder, _)| !folder.is_empty()).ok_or("a row is DIR:ROW, such as results/runs/sweep:17")?;
+    Ok((PathBuf::from(folder), row))
+}
+
+/// `i/n`.
+fn shard(text: &str) -> Result<[u64; 2], String> {
+    let parts = text.split_once('/').and_then(|(i, n)| Some([i.parse().ok()?, n.parse().ok()?]));
+    let [i, n]: [u64; 2] = parts.ok_or("a shard is i/n, such as 2/8")?;
+    if i == 0 || i > n {
+        return Err(format!("allowed are shards 1/{n} to {n}/{n}", n = n.max(1)));
+    }
+    Ok([i, n])
+}
+
+/// The shard that a batch system gave this process, if one did.
+fn shard_from(variable: impl Fn(&str) -> Option<String>) -> Result<Option<[u64; 2]>, Error> {
+    let number = |name: &str| -> Result<Option<u64>, Error> {
+        let Some(text) = variable(name) else { return Ok(None) };
+        let invalid = || Error::Invalid { what: name.into(), found: text.clone(), allowed: "a whole number from 0".into() };
+        text.parse().map(Some).map_err(|_| invalid())
+    };
+    let (index, index_name, count, count_name) = if let Some(id) = number("SLURM_ARRAY_TASK_ID")? {
+        let (least, step) = (number("SLURM_ARRAY_TASK_MIN")?.unwrap_or(0), number("SLURM_ARRAY_TASK_STEP")?.unwrap_or(1));
+        let index = id.saturating_sub(least) / step.max(1);
+        (index, "SLURM_ARRAY_TASK_ID", number("SLURM_ARRAY_TASK_COUNT")?, "SLURM_ARRAY_TASK_COUNT")
+    } else if let Some(index) = number("JOB_COMPLETION_INDEX")? {
+        (index, "JOB_COMPLETION_INDEX", number("WAYHOME_SHARDS")?, "WAYHOME_SHARDS")
+    } else {
+        return Ok(None);
+    };
+    let invalid = |what: &str, found: String, allowed: String| Error::Invalid { what: what.into(), found, allowed };
+    let Some(count) = count else {
+        let allowed = format!("the number of shards, as {index_name} is set; or --shard i/n");
+        return Err(invalid(count_name, "nothing".into(), allowed));
+    };
+    if index >= count {
+        return Err(invalid(index_name, format!("shard {} of {count}", index + 1), format!("1 to {count} of them")));
+    }
+    Ok(Some([index + 1, count]))
+}
+
+/// What `--json` prints.
+#[derive(Serialize)]
+struct Output {
+    study: String,
+    study_sha256: String,
+    shard: [u64; 2],
+    /// Episodes of the study, and those whose rows are there.
+    episodes: u64,
+    episodes_done: u64,
+    complete: bool,
+    /// Episodes that this call ran, and how fast.
+    rate: Rate,
+    out: String,
+}
+
+pub fn run(args: &SweepArgs, context: &Context) -> Result<Verdict> {
+    match (&args.command, &args.study) {
+        (Some(SweepCommand::Merge { shards, out }), _) => merge(shards, out, context),
+        (Some(SweepCommand::Report { study, out }), _) => report(study, out.as_deref(), context),
+        (None, Some(study)) => sweep(args, study, context),
+        (None, None) => {
+            let mut text = String::new();
+            for (name, words) in catalogue() {
+                let _ = writeln!(text, "{}", format!("{name:<28} {words}").trim_end());
+            }
+            print(&text)?;
+            Ok(Verdict::Done)
+        }
+    }
+}
+
+fn sweep(args: &SweepArgs, argument: &str, context: &Context) -> Result<Verdict> {
+    let [shard, of] = match args.shard {
+        Some(shard) => shard,
+        None => shard_from(|name| std::env::var(name).ok())?.unwrap_or([1, 1]),
+    };
+    let study = Study::open(argument, args.seeds.clone())?;
+    let out = args.out.clone().unwrap_or_else(|| default_folder(&["sweep", &study.name]));
+    let folder = StudyFolder::create(&out, study, Path::new(argument), args.keep_failures)?;
+    let study = folder.study();
+    let done = folder.done()?;
+    let chunks: Vec<u64> = (0..study.chunks()).filter(|k| k % of == shard - 1 && !done.contains(k)).collect();
+    let episodes: u64 = chunks.iter().map(|&k| study.chunk(k).count).sum();
+    let threads = rayon::current_num_threads();
+    let bar = context.progress(Some(episodes))?;
+    let (began, tally) = (Instant::now(), Mutex::new((0_u64, 0_u64)));
+    let watch = |row: &Row| {
+        if let Ok(mut tally) = tally.lock() {
+            *tally = (tally.0 + 1, tally.1 + u64::from(row.is_home()));
+            bar.set_message(progress(*tally, episodes, began.elapsed().as_secs_f64()));
+        }
+        bar.inc(1);
+        ControlFlow::Continue(())
+    };
+    let result = run_chunks(study, &chunks, threads, &folder, &watch, &|| context.is_stopped());
+    bar.finish_and_clear();
+    let (run, _) = tally.into_inner().unwrap_or_default();
+    let wall_s = began.elapsed().as_secs_f64();
+    let rate = Rate { threads, episodes: run, wall_s, episodes_per_minute: 60.0 * run as f64 / wall_s.max(1e-9) };
+    if run > 0 {
+        folder.note_rate([shard, of], rate.clone())?;
+    }
+    result?;
+    let complete = folder.complete()?;
+    report_end(context, &folder, [shard, of], complete, rate)?;
+    Ok(Verdict::Done)
+}
+
+fn report_end(context: &Context, folder: &StudyFolder, shard: [u64; 2], complete: bool, rate: Rate) -> Result<()> {
+    let study = folder.study();
+    let out = folder.path().display().to_string();
+    let rows = folder.parts()?;
+    let output = Output {
+        study: study.name.clone(),
+        study_sha256: study.sha256(),
+        shard,
+        episodes: study.episodes(),
+        episodes_done: rows.len() as u64,
+        complete,
+        rate,
+        out,
+    };
+    context.print(&output, || {
+        let home = rows.iter().filter(|row| row.is_home()).count();
+        let [low, high] = wilson_95(home, rows.len());
+        let rate = &output.rate;
+        format!(
+            "study   {}, {} cells of {} seeds\nrows    {} of {}{}\nhome    {home} of {} (95 % Wilson {:.1} to {:.1} %)\nrate    {} episodes in {:.1} s on {} threads, {:.1} a minute\nfiles   {}\n",
+            output.study,
+            study.cells(),
+            study.episodes_per_cell(),
+            rows.len(),
+            output.episodes,
+            if output.complete { ", all of them" } else { "" },
+            rows.len(),
+            100.0 * low,
+            100.0 * high,
+            rate.episodes,
+            rate.wall_s,
+            rate.threads,
+            rate.episodes_per_minute,
+            output.out,
+        )
+    })
+}
+
+/// What stands beside the bar: rate, time left, success so far.
+fn progress((run, home): (u64, u64), of: u64, wall_s: f64) -> String {
+    let a_second = run as f64 / wall_s.max(1e-3);
+    let left_s = (of.saturating_sub(run) as f64 / a_second.max(1e-9)) as u64;
+    let left = if left_s < 90 { format!("{left_s} s") } else { format!("{} min", left_s.div_ceil(60)) };
+    let share = 100.0 * home as f64 / run.max(1) as f64;
+    format!("{:.0} a minute, {left} left, {share:.1} % home", 60.0 * a_second)
+}
+
+fn merge(shards: &[PathBuf], out: &Path, context: &Context) -> Result<Verdict> {
+    let first = StudyFolder::open(&shards[0])?;
+    let folder = StudyFolder::create(out, first.study().clone(), first.source(), false)?;
+    for shard in shards.iter().filter(|shard| shard.as_path() != out) {
+        folder.take(shard)?;
+    }
+    folder.rows()?; // tells what is missing
+    let complete = folder.complete()?;
+    let rate = Rate { threads: 0, episodes: 0, wall_s: 0.0, episodes_per_minute: 0.0 };
+    report_end(context, &folder, [1, 1], complete, rate)?;
+    Ok(Verdict::Done)
+}
+
+fn report(study: &Path, out: Option<&Path>, context: &Context) -> Result<Verdict> {
+    let folder = StudyFolder::open(study)?;
+    let out = out.map_or_else(|| study.join("report"), Path::to_owned);
+    let bar = context.progress(None)?;
+    page::write(&folder, &out, &mut || {
+        bar.set_message("running failures again");
+        bar.tick();
+        if context.is_stopped() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    })?;
+    bar.finish_and_clear();
+    let page = out.join("index.html").display().to_string();
+    context.print(&serde_json::json!({ "page": page }), || format!("page    {page}\n"))?;
+    Ok(Verdict::Done)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shards_are_read_and_checked() {
+        assert_eq!(shard("2/8"), Ok([2, 8]));
+        for bad in ["0/8", "9/8", "8", "1/0", "a/b", "-1/2", "1/2/3"] {
+            assert!(shard(bad).is_err(), "{bad}");
+        }
+        assert!(shard("9/8").unwrap_err().contains("1/8 to 8/8"));
+        assert_eq!(row("a:b/c:17"), Ok(("a:b/c".into(), 17)));
+        assert!(row("17").is_err() && row(":17").is_err() && row("a:b").is_err());
+    }
+
+    #[test]
+    fn batch_systems_say_which_shard_it_is() {
+        let given = |pairs: &'static [(&str, &str)]| {
+            shard_from(|name| pairs.iter().find(|(key, _)| *key == name).map(|(_, value)| (*value).to_owned()))
+        };
+        assert_eq!(given(&[]).unwrap(), None);
+        let slurm: &[_] = &[("SLURM_ARRAY_TASK_ID", "7"), ("SLURM_ARRAY_TASK_MIN", "1"), ("SLURM_ARRAY_TASK_COUNT", "8")];
+        assert_eq!(given(slurm).unwrap(), Some([7, 8]));
+        assert_eq!(given(&[("JOB_COMPLETION_INDEX", "0"), ("WAYHOME_SHARDS", "4")]).unwrap(), Some([1, 4]));
+        assert!(given(&[("JOB_COMPLETION_INDEX", "0")]).unwrap_err().to_string().contains("WAYHOME_SHARDS"));
+        assert!(given(&[("JOB_COMPLETION_INDEX", "4"), ("WAYHOME_SHARDS", "4")]).unwrap_err().to_string().contains("1 to 4"));
+        assert!(given(&[("JOB_COMPLETION_INDEX", "x"), ("WAYHOME_SHARDS", "4")]).is_err());
+    }
+
+    #[test]
+    fn the_bar_tells_rate_time_and_success() {
+        assert_eq!(progress((30, 24), 90, 30.0), "60 a minute, 60 s left, 80.0 % home");
+        assert_eq!(progress((30, 30), 3030, 30.0), "60 a minute, 50 min left, 100.0 % home");
+    }
+}

@@ -1,0 +1,343 @@
+//! Everything that a study can set, by name.
+//!
+//! A setting is called as the command line calls it (`method`, `time_limit_s`), a field of the world as `world.` and its place
+//! in the file (`world.floor.friction`, `world.obstacles[stool].height_m`), one of the anchored filter as `filter.` and one of
+//! the extractor as `extractor.` and the field's name. Beside these there are settings that change several fields at once:
+//! `floor_friction`, `walkers`, `start_distance_m`.
+
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+
+use super::value::Value;
+use crate::episode::method::{LawKind, MethodKind};
+use crate::episode::{Bearings, PlantKind, Setup, Start};
+use crate::error::{Error, Result};
+use crate::estimation::anchored::FilterSettings;
+use crate::render::RendererChoice;
+use crate::study::compare::{CONTENDERS, pick};
+use crate::vision::{ExtractorSettings, Landmarks};
+use crate::world::{CameraPreset, Draft, LightPreset, World};
+
+/// Half the width of the ring that starts at a given distance are drawn from, m.
+pub const START_RING_M: f64 = 0.05;
+
+/// A world and a setup that settings are applied to.
+#[derive(Debug, Clone)]
+pub struct Case {
+    /// The world.
+    pub draft: Draft,
+    /// All else.
+    pub setup: Setup,
+}
+
+/// What a value did not fit: what is allowed instead.
+type Refusal = String;
+type Apply = fn(&mut Case, &Value) -> std::result::Result<(), Refusal>;
+
+/// Settings by name, all but those of `world.`, `filter.` and `extractor.`, with what they are.
+const SETTINGS: &[(&str, &str, Apply)] = &[
+    ("world", "world file or built-in world", |case, value| {
+        case.draft = Draft::open(text(value)?).map_err(|e| e.to_string())?;
+        Ok(())
+    }),
+    // Before those that a method's name implies, so that what is said of them beside it holds.
+    ("method", "homing method, by its name in `wayhome compare`", |case, value| set_method(&mut case.setup, text(value)?)),
+    ("controller", "steering law", |case, value| {
+        choose(&mut case.setup.law, &[LawKind::Proportional, LawKind::Lyapunov], value)
+    }),
+    ("compass_deg", "standard deviation of the compass, degrees", |case, value| {
+        case.setup.compass_sd_rad = Some(at_least_0(value)?.to_radians());
+        Ok(())
+    }),
+    ("plant", "what moves", |case, value| choose(&mut case.setup.plant, &[PlantKind::Rapier, PlantKind::Unicycle], value)),
+    ("bearings", "where bearings come from", |case, value| {
+        choose(&mut case.setup.bearings, &[Bearings::Rendered, Bearings::Ideal, Bearings::Noisy], value)
+    }),
+    ("landmarks", "what a landmark of rendered bearings is", |case, value| {
+        choose(&mut case.setup.extractor.landmarks, &[Landmarks::Features, Landmarks::Objects], value)
+    }),
+    ("renderer", "what renders", |case, value| {
+        case.setup.renderer = match text(value)? {
+            "cpu" => RendererChoice::Cpu,
+            "gpu" => RendererChoice::Gpu,
+            _ => return Err("\"cpu\" or \"gpu\"; what is there on a machine must not decide about the rows".into()),
+        };
+        Ok(())
+    }),
+    ("size", "columns and rows of the panorama, \"720x90\"", |case, value| {
+        let size = text(value)?.split_once('x').and_then(|(w, h)| Some((w.parse().ok()?, h.parse().ok()?)));
+        let fits = |&(w, h): &(u32, u32)| (16..=16384).contains(&w) && (8..=4096).contains(&h);
+        case.setup.size_px = Some(size.filter(fits).ok_or("a size from 16x8 to 16384x4096 pixels in quotes, as \"720x90\"")?);
+        Ok(())
+    }),
+    ("light", "light", |case, value| choose_one(&mut case.setup.look.light, &LightPreset::ALL, value)),
+    ("camera", "camera", |case, value| choose_one(&mut case.setup.look.camera, &CameraPreset::ALL, value)),
+    ("home_light", "light at home", |case, value| choose_one(&mut case.setup.home_look.light, &LightPreset::ALL, value)),
+    ("home_camera", "camera at home", |case, value| choose_one(&mut case.setup.home_look.camera, &CameraPreset::ALL, value)),
+    ("start", "random, or a start that the world names", |case, value| {
+        let name = text(value)?;
+        case.setup.start = if name == "random" { Start::Random } else { Start::Named(name.to_owned()) };
+        Ok(())
+    }),
+    ("start_distance_m", "distance of random starts from home, to 5 cm", |case, value| {
+        let distance = at_least_0(value)?;
+        put(case, "start.min_distance_m", &(distance - START_RING_M).max(0.0))?;
+        put(case, "start.max_distance_m", &(distance + START_RING_M))
+    }),
+    ("time_limit_s", "time limit, s", |case, value| {
+        case.setup.time_limit_s = Some(at_least_0(value).ok().filter(|s| *s > 0.0).ok_or("a number greater than 0")?);
+        Ok(())
+    }),
+    ("told_start", "whether paper-ekf is told where it starts", |case, value| {
+        let Value::Truth(told) = value else { return Err("true or false".into()) };
+        // Only the paper's filter can be told; the other methods of a study start as they always do.
+        case.setup.told_start = *told && case.setup.method == MethodKind::PaperEkf;
+        Ok(())
+    }),
+    ("noise_deg", "standard deviation of noisy bearings, degrees", |case, value| {
+        case.setup.noise.sd_rad = at_least_0(value)?.to_radians();
+        Ok(())
+    }),
+    ("noise_dropout", "share of noisy bearings that are missed", |case, value| set_share(&mut case.setup.noise.dropout, value)),
+    ("noise_false", "share of noisy bearings that are false", |case, value| {
+        set_share(&mut case.setup.noise.false_match, value)
+    }),
+    ("hidden_share", "share of the home landmarks never seen on the way", |case, value| {
+        set_share(&mut case.setup.degradation.hidden, value)
+    }),
+    ("false_match_share", "share of bearings made false matches", |case, value| {
+        set_share(&mut case.setup.degradation.false_match, value)
+    }),
+    ("added_noise_deg", "noise added to bearings of any sensor, degrees", |case, value| {
+        case.setup.degradation.noise_sd_rad = at_least_0(value)?.to_radians();
+        Ok(())
+    }),
+    ("floor_friction", "friction of the whole floor, its zones taken away", |case, value| {
+        let friction = value.number().ok_or("a number")?;
+        case.draft.set_friction(friction).map_err(|e| e.to_string())
+    }),
+    ("walkers", "how many of the world's walkers stay", |case, value| {
+        let Value::Whole(count) = value else { return Err("a whole number".into()) };
+        let count = usize::try_from(*count).map_err(|_| "a whole number from 0")?;
+        case.draft.keep_walkers(count).map_err(|e| e.to_string())
+    }),
+    ("image_noise_electrons", "read noise of the camera on the way and at home", |case, value| {
+        let read = at_least_0(value)?;
+        let saturation = 10_000.0; // of the decent camera
+        put(
+            case,
+            "camera.optics.noise",
+            &std::collections::BTreeMap::from([("saturation_electrons", saturation), ("read_electrons", read)]),
+        )
+    }),
+];
+
+/// Sets one setting.
+///
+/// # Errors
+/// When there is none of this name, or it does not take the value: what was found and what is allowed.
+pub(super) fn apply(case: &mut Case, name: &str, value: &Value) -> Result<()> {
+    let refused = |allowed: String| Error::Invalid { what: name.to_owned(), found: value.to_string(), allowed };
+    if let Some((_, _, apply)) = SETTINGS.iter().find(|(known, ..)| *known == name) {
+        return apply(case, value).map_err(refused);
+    }
+    match name.split_once('.') {
+        Some(("world", place)) if !place.is_empty() => case.draft.set(place, value),
+        Some(("filter", field)) => change(&mut case.setup.filter, field, value).map_err(refused),
+        Some(("extractor", field)) => change(&mut case.setup.extractor, field, value).map_err(refused),
+        _ => Err(Error::Invalid { what: "setting".into(), found: name.to_owned(), allowed: near(name) }),
+    }
+}
+
+/// Place of a setting in the order in which settings are applied: the world first, then its fields, then all else in the order of
+/// the list, so that no setting undoes another.
+pub(super) fn rank(name: &str) -> usize {
+    match SETTINGS.iter().position(|(known, ..)| *known == name) {
+        Some(0) => 0,
+        None if name.starts_with("world.") => 1,
+        Some(k) => 1 + k,
+        None => usize::MAX,
+    }
+}
+
+/// Whether there is a setting of this name. Fields of the world are checked by the world itself.
+pub(super) fn exists(name: &str) -> bool {
+    SETTINGS.iter().any(|(known, ..)| *known == name)
+        || all_names().contains(&without_entries(name))
+        || name.strip_prefix("world.").is_some_and(|place| place.contains('['))
+}
+
+/// Whether there are settings whose names go on from this one, as `world.floor.friction` does from `world.floor`.
+pub(super) fn has_parts(name: &str) -> bool {
+    let beginning = format!("{name}.");
+    all_names().iter().any(|known| known.starts_with(&beginning))
+}
+
+/// All settings with a few words each; fields of the world, the filter and the extractor without.
+#[must_use]
+pub fn catalogue() -> Vec<(String, &'static str)> {
+    let words = |name: &str| SETTINGS.iter().find(|(known, ..)| *known == name).map_or("", |(_, words, _)| *words);
+    all_names().into_iter().map(|name| (name.clone(), words(&name))).collect()
+}
+
+fn all_names() -> Vec<String> {
+    let fields = |prefix: &str, settings: serde_json::Value| -> Vec<String> {
+        settings.as_object().into_iter().flatten().map(|(key, _)| format!("{prefix}.{key}")).collect()
+    };
+    let mut names: Vec<String> = SETTINGS.iter().map(|(name, ..)| (*name).to_owned()).collect();
+    names.extend(fields("filter", serde_json::to_value(FilterSettings::default()).unwrap_or_default()));
+    names.extend(fields("extractor", serde_json::to_value(ExtractorSettings::default()).unwrap_or_default()));
+    names.extend(World::field_names().into_iter().map(|place| format!("world.{place}")));
+    names
+}
+
+/// `world.obstacles[2].height_m` as `world.obstacles[].height_m`.
+fn without_entries(name: &str) -> String {
+    let mut plain = String::new();
+    for (k, part) in name.split('[').enumerate() {
+        match part.split_once(']') {
+            Some((_, rest)) if k > 0 => plain += &format!("[]{rest}"),
+            _ => plain += part,
+        }
+    }
+    plain
+}
+
+/// The settings whose names are most like `name`, for a message.
+pub(super) fn near(name: &str) -> String {
+    let last = |name: &str| name.rsplit('.').next().unwrap_or(name).to_owned();
+    let mut names: Vec<(usize, String)> = all_names()
+        .into_iter()
+        .map(|known| (distance(name, &known).min(1 + distance(&last(name), &last(&known))), known))
+        .collect();
+    names.sort();
+    let nearest: Vec<String> = names.into_iter().take(5).map(|(_, name)| name).collect();
+    format!("a setting; the nearest are {} (`wayhome sweep --settings` lists all)", nearest.join(", "))
+}
+
+/// Letters to put in, take out or change to make one word the other (Levenshtein 1966).
+fn distance(a: &str, b: &str) -> usize {
+    let b: Vec<char> = b.chars().collect();
+    let mut row: Vec<usize> = (0..=b.len()).collect();
+    for (i, letter) in a.chars().enumerate() {
+        let mut diagonal = std::mem::replace(&mut row[0], i + 1);
+        for (j, other) in b.iter().enumerate() {
+            let changed = diagonal + usize::from(letter != *other);
+            diagonal = row[j + 1];
+            row[j + 1] = changed.min(row[j] + 1).min(diagonal + 1);
+        }
+    }
+    row[b.len()]
+}
+
+/// A contender's method, and what else its name says; what it does not say stays.
+fn set_method(setup: &mut Setup, name: &str) -> std::result::Result<(), Refusal> {
+    let keys = || CONTENDERS.iter().map(|c| c.key).collect::<Vec<_>>().join(", ");
+    let found = pick(&[name.to_owned()]).map_err(|_| keys())?;
+    let contender = found.first().ok_or_else(keys)?;
+    setup.method = contender.method;
+    if contender.law != LawKind::Proportional {
+        setup.law = contender.law;
+    }
+    if contender.compass {
+        setup.compass_sd_rad = Some(setup.compass_sd_rad.unwrap_or(0.0));
+    }
+    setup.told_start = contender.told_start;
+    Ok(())
+}
+
+fn text(value: &Value) -> std::result::Result<&str, Refusal> {
+    value.text().ok_or_else(|| "a text in quotes".into())
+}
+
+fn at_least_0(value: &Value) -> std::result::Result<f64, Refusal> {
+    value.number().filter(|x| *x >= 0.0 && x.is_finite()).ok_or_else(|| "a number from 0".into())
+}
+
+fn set_share(field: &mut f64, value: &Value) -> std::result::Result<(), Refusal> {
+    *field = value.number().filter(|x| (0.0..=1.0).contains(x)).ok_or("a number from 0 to 1")?;
+    Ok(())
+}
+
+fn put(case: &mut Case, place: &str, value: &impl Serialize) -> std::result::Result<(), Refusal> {
+    case.draft.set(place, value).map_err(|e| e.to_string())
+}
+
+/// Sets `field` to that of `all` whose name in files is the value.
+fn choose<T: Serialize + Copy>(field: &mut T, all: &[T], value: &Value) -> std::result::Result<(), Refusal> {
+    let name = |one: &T| serde_json::to_value(one).ok().and_then(|v| Some(v.as_str()?.to_owned())).unwrap_or_default();
+    let found = all.iter().find(|one| value.text() == Some(name(one).as_str()));
+    *field = *found.ok_or_else(|| all.iter().map(name).collect::<Vec<_>>().join(", "))?;
+    Ok(())
+}
+
+fn choose_one<T: Serialize + Copy>(field: &mut Option<T>, all: &[T], value: &Value) -> std::result::Result<(), Refusal> {
+    let mut chosen = *all.first().ok_or("nothing")?;
+    choose(&mut chosen, all, value)?;
+    *field = Some(chosen);
+    Ok(())
+}
+
+/// Changes one field of a struct by its name.
+fn change<T: Serialize + DeserializeOwned>(settings: &mut T, field: &str, value: &Value) -> std::result::Result<(), Refusal> {
+    let mut tree = serde_json::to_value(&*settings).map_err(|e| e.to_string())?;
+    let known = tree.as_object().map(|o| o.keys().cloned().collect::<Vec<_>>().join(", ")).unwrap_or_default();
+    let slot = tree.get_mut(field).ok_or_else(|| format!("one of {known}"))?;
+    *slot = serde_json::to_value(value).map_err(|e| e.to_string())?;
+    *settings = serde_json::from_value(tree).map_err(|e| format!("a value that fits ({e})"))?;
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn case() -> Case {
+        Case { draft: Draft::open("crowd").unwrap(), setup: Setup::default() }
+    }
+
+    #[test]
+    fn settings_reach_what_they_name() {
+        let mut case = case();
+        for (name, value) in [
+            ("method", Value::Text("alv-compass".into())),
+            ("compass_deg", Value::Real(3.0)),
+            ("hidden_share", Value::Real(0.5)),
+            ("light", Value::Text("night".into())),
+            ("filter.gate", Value::Whole(9)),
+            ("extractor.features", Value::Whole(200)),
+            ("walkers", Value::Whole(3)),
+            ("world.task.arrival_radius_m", Value::Real(0.1)),
+            ("world.obstacles[child].height_m", Value::Real(1.1)),
+            ("start_distance_m", Value::Real(1.5)),
+            ("floor_friction", Value::Real(0.2)),
+        ] {
+            assert!(exists(name), "{name}");
+            if !name.contains("child") {
+                apply(&mut case, name, &value).unwrap();
+            }
+        }
+        let world = case.draft.world().unwrap();
+        let setup = &case.setup;
+        assert_eq!((setup.method, setup.filter.gate, setup.extractor.features), (MethodKind::Alv, 9.0, 200));
+        assert!((setup.compass_sd_rad.unwrap() - 3.0_f64.to_radians()).abs() < 1e-12 && setup.degradation.hidden == 0.5);
+        assert_eq!((world.spec.task.arrival_radius_m, world.spec.floor.friction), (0.1, 0.2));
+        assert_eq!(world.bodies.len(), world.landmark_count + 3);
+    }
+
+    #[test]
+    fn what_does_not_fit_is_told_with_what_would() {
+        let told = |name: &str, value: Value| apply(&mut case(), name, &value).unwrap_err().to_string();
+        assert!(told("hidden_shair", Value::Real(0.5)).contains("hidden_share"));
+        assert!(told("friction", Value::Real(0.5)).contains("world.floor.friction"));
+        assert!(told("hidden_share", Value::Real(1.5)).contains("0 to 1"));
+        assert!(told("method", Value::Text("magic".into())).contains("tron-daniilidis-compass"));
+        assert!(told("filter.gait", Value::Real(1.0)).contains("gate"));
+        assert!(told("filter.gate", Value::Text("wide".into())).contains("wide"));
+        assert!(told("light", Value::Text("dusk".into())).contains("evening"));
+        assert!(told("walkers", Value::Whole(12)).contains("0 to 9"));
+        assert_eq!((distance("slip", "slipper"), distance("kitten", "sitting")), (3, 3));
+        assert!(catalogue().iter().any(|(name, _)| name == "world.robot.mass_kg"));
+        assert!(!exists("world.floor.grip") && exists("world.landmarks[0].height_m"));
+    }
+}

@@ -1,0 +1,559 @@
+//! Study files: what a person writes, checked as a whole before anything runs.
+
+use std::ops::RangeInclusive;
+use std::path::{Path, PathBuf};
+
+use serde::Serialize;
+use sha2::{Digest, Sha256};
+
+use super::design::{self, Design, SOBOL_AXES};
+use super::settings::{self, Case};
+use super::value::Value;
+use crate::episode::Setup;
+use crate::error::{Error, Result};
+use crate::random::Seed;
+use crate::render::RendererChoice;
+use crate::world::document::{Node, Value as Read};
+use crate::world::{Draft, World, WorldFault};
+
+/// Most episodes of one study.
+pub const MOST_EPISODES: u64 = 100_000_000;
+/// Most episodes in one chunk, the unit in which a study is run, stored and resumed.
+const CHUNK_EPISODES: u64 = 20;
+/// Studies that the program carries with it, as (name, TOML text).
+const BUILTIN: [(&str, &str); 4] = [
+    ("slip-occlusion", include_str!("../../../worlds/studies/slip-occlusion.toml")),
+    ("wet-hall", include_str!("../../../worlds/studies/wet-hall.toml")),
+    ("light-camera", include_str!("../../../worlds/studies/light-camera.toml")),
+    ("faults-sobol", include_str!("../../../worlds/studies/faults-sobol.toml")),
+];
+
+/// A setting that a study varies.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Axis {
+    /// Name of the setting.
+    pub setting: String,
+    /// What figures call it.
+    pub label: String,
+    /// Its levels.
+    pub levels: Levels,
+}
+
+/// What an axis can be.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Levels {
+    /// These, each with all other axes' levels and with all points.
+    Listed(Vec<Value>),
+    /// Anything between two values, one of each point of a random or Sobol design.
+    Between {
+        /// Least value.
+        low: f64,
+        /// Greatest value.
+        high: f64,
+        /// Whether equal ratios are equally likely rather than equal differences.
+        log: bool,
+    },
+}
+
+/// A checked study: cells (one a combination of levels) of episodes (one a seed).
+///
+/// The episodes of a cell have the study's seeds, the same ones in all cells: runs with one seed start at the same place and meet
+/// the same draws of noise wherever the cells' settings leave those alone, so that differences between cells are differences of
+/// pairs.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Study {
+    /// Name.
+    pub name: String,
+    /// What it is for.
+    pub description: String,
+    /// World as a person named it.
+    #[serde(skip)]
+    pub world: String,
+    /// SHA-256 of the base world.
+    pub world_sha256: String,
+    /// Seed of random points; the episodes have their own.
+    pub seed: u64,
+    /// Seeds of each cell's episodes.
+    pub seeds: RangeInclusive<u64>,
+    /// How points are chosen.
+    pub design: Design,
+    /// Points of a random or Sobol design; 1 of a grid.
+    pub points: u64,
+    /// Settings that all cells share, in the file's order.
+    pub settings: Vec<(String, Value)>,
+    /// What varies, in the file's order.
+    pub axes: Vec<Axis>,
+    /// The setting whose levels are compared with one another, if it is one of the axes.
+    pub compare: String,
+    /// The file's text.
+    #[serde(skip)]
+    pub text: String,
+}
+
+/// A run of episodes in one cell.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Chunk {
+    /// Its number.
+    pub index: u64,
+    /// Its cell.
+    pub cell: u64,
+    /// Number of its first episode.
+    pub first: u64,
+    /// Seed of its first episode.
+    pub seed: u64,
+    /// How many episodes it has.
+    pub count: u64,
+}
+
+impl Study {
+    /// Opens a study by what a person typed: the path of a file if there is one, else the name of a built-in study. `seeds`
+    /// replaces the file's.
+    ///
+    /// # Errors
+    /// When there is neither, the file cannot be read, or it has faults; all that can be found at once come at once.
+    pub fn open(argument: &str, seeds: Option<RangeInclusive<u64>>) -> Result<Self> {
+        let path = Path::new(argument);
+        if path.is_file() {
+            let text =
+                std::fs::read_to_string(path).map_err(|source| Error::Io { action: "read", path: path.to_owned(), source })?;
+            return Self::from_toml(&text, path, seeds);
+        }
+        let bare = argument.strip_prefix("worlds/studies/").unwrap_or(argument);
+        let bare = bare.strip_suffix(".toml").unwrap_or(bare);
+        match BUILTIN.iter().find(|(name, _)| *name == bare) {
+            Some((name, text)) => Self::from_toml(text, Path::new(&format!("builtin:{name}")), seeds),
+            None => Err(Error::Invalid {
+                what: "study".into(),
+                found: format!("{argument}, which is no file"),
+                allowed: format!("a study file, or a built-in study: {}", Self::builtin_names().join(", ")),
+            }),
+        }
+    }
+
+    /// Names of the built-in studies.
+    #[must_use]
+    pub fn builtin_names() -> Vec<&'static str> {
+        BUILTIN.iter().map(|(name, _)| *name).collect()
+    }
+
+    /// Checks a study given as text. `source` names it in messages; a world is looked for in its folder, too.
+    ///
+    /// # Errors
+    /// As [`Study::open`].
+    pub fn from_toml(text: &str, source: &Path, seeds: Option<RangeInclusive<u64>>) -> Result<Self> {
+        let tree = Node::from_toml(text, source)?;
+        let mut reader = Reader { source, faults: Vec::new() };
+        let study = reader.study(&tree, text, seeds);
+        match study {
+            Some(study) if reader.faults.is_empty() => {
+                study.check(&tree, source)?;
+                Ok(study)
+            }
+            _ => Err(reader.error()),
+        }
+    }
+
+    /// Names the study and everything that decides about its rows, this program's version included: rows of studies with equal
+    /// hashes belong together.
+    #[must_use]
+    pub fn sha256(&self) -> String {
+        let text = serde_json::to_string(self).unwrap_or_default();
+        let hash = Sha256::digest(format!("wayhome {}\n{text}", env!("CARGO_PKG_VERSION")));
+        hash.iter().map(|b| format!("{b:02x}")).collect()
+    }
+
+    /// Combinations of the listed levels.
+    fn combinations(&self) -> u64 {
+        self.axes.iter().map(|axis| if let Levels::Listed(values) = &axis.levels { values.len() as u64 } else { 1 }).product()
+    }
+
+    /// Number of cells.
+    #[must_use]
+    pub fn cells(&self) -> u64 {
+        self.points * self.combinations()
+    }
+
+    /// Episodes of a cell.
+    #[must_use]
+    pub fn episodes_per_cell(&self) -> u64 {
+        self.seeds.end() - self.seeds.start() + 1
+    }
+
+    /// Number of episodes.
+    #[must_use]
+    pub fn episodes(&self) -> u64 {
+        self.cells() * self.episodes_per_cell()
+    }
+
+    /// Number of chunks.
+    #[must_use]
+    pub fn chunks(&self) -> u64 {
+        self.cells() * self.episodes_per_cell().div_ceil(CHUNK_EPISODES)
+    }
+
+    /// The chunk of a number below [`Study::chunks`].
+    #[must_use]
+    pub fn chunk(&self, index: u64) -> Chunk {
+        let (per_cell, episodes) = (self.episodes_per_cell().div_ceil(CHUNK_EPISODES), self.episodes_per_cell());
+        let (cell, before) = (index / per_cell, index % per_cell * CHUNK_EPISODES);
+        let count = CHUNK_EPISODES.min(episodes - before);
+        Chunk { index, cell, first: cell * episodes + before, seed: self.seeds.start() + before, count }
+    }
+
+    /// Number of the chunk that an episode is in.
+    #[must_use]
+    pub fn chunk_of(&self, episode: u64) -> u64 {
+        let per_cell = self.episodes_per_cell();
+        episode / per_cell * per_cell.div_ceil(CHUNK_EPISODES) + episode % per_cell / CHUNK_EPISODES
+    }
+
+    /// Cell and seed of an episode.
+    #[must_use]
+    pub fn place(&self, episode: u64) -> (u64, u64) {
+        (episode / self.episodes_per_cell(), self.seeds.start() + episode % self.episodes_per_cell())
+    }
+
+    /// The axes' values in a cell. The last axis changes fastest, the point slowest.
+    #[must_use]
+    pub fn values(&self, cell: u64) -> Vec<Value> {
+        let sampled = self.axes.iter().filter(|axis| matches!(axis.levels, Levels::Between { .. })).count();
+        let point = design::point(self.design, Seed(self.seed), cell / self.combinations(), sampled);
+        let mut place = cell % self.combinations();
+        let mut coordinate = point.iter().rev();
+        let mut values: Vec<Value> = self
+            .axes
+            .iter()
+            .rev()
+            .map(|axis| match &axis.levels {
+                Levels::Listed(values) => {
+                    let value = &values[(place % values.len() as u64) as usize];
+                    place /= values.len() as u64;
+                    value.clone()
+                }
+                Levels::Between { low, high, log } => {
+                    let share = coordinate.next().copied().unwrap_or_default();
+                    Value::Real(if *log { low * libm::pow(high / low, share) } else { low + share * (high - low) })
+                }
+            })
+            .collect();
+        values.reverse();
+        values
+    }
+
+    /// World and setup of a cell.
+    ///
+    /// # Errors
+    /// When its settings do not go together.
+    pub fn case(&self, values: &[Value]) -> Result<(World, Setup)> {
+        let mut settings: Vec<(&str, &Value)> = self.settings.iter().map(|(name, value)| (name.as_str(), value)).collect();
+        settings.extend(self.axes.iter().zip(values).map(|(axis, value)| (axis.setting.as_str(), value)));
+        settings.sort_by_key(|(name, _)| settings::rank(name)); // stable: of two of one rank the later one holds
+        // The CPU, so that rows are the same on a machine with a graphics card.
+        let setup = Setup { renderer: RendererChoice::Cpu, ..Setup::default() };
+        let mut case = Case { draft: Draft::open(&self.world)?, setup };
+        for (name, value) in settings {
+            settings::apply(&mut case, name, value)?;
+        }
+        Ok((case.draft.world()?, case.setup))
+    }
+
+    /// Sets every level of every axis once, beside the first levels of the others.
+    fn check(&self, tree: &Node, source: &Path) -> Result<()> {
+        let first = self.values(0);
+        let try_out = |values: &[Value]| self.case(values).and_then(|(_, setup)| setup.degradation.check());
+        if let Err(error) = try_out(&first) {
+            let line = self.axes.iter().zip(0..).find_map(|(axis, k)| {
+                let named = matches!(&error, Error::Invalid { what, .. } if *what == axis.setting);
+                named.then(|| tree.locate(&format!("axes[{k}]")).0)
+            });
+            return Err(at_place(source, "the study's settings", line.flatten(), &error));
+        }
+        for (k, axis) in self.axes.iter().enumerate() {
+            let levels = match &axis.levels {
+                Levels::Listed(values) => values.clone(),
+                Levels::Between { low, high, .. } => vec![Value::Real(*low), Value::Real(*high)],
+            };
+            for level in levels {
+                let mut values = first.clone();
+                values[k] = level.clone();
+                if let Err(error) = try_out(&values) {
+                    let line = tree.locate(&format!("axes[{k}].values")).0;
+                    return Err(at_place(source, &format!("axis {} at {level}", axis.setting), line, &error));
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+fn at_place(source: &Path, place: &str, line: Option<usize>, error: &Error) -> Error {
+    let line = line.map_or_else(String::new, |line| format!("line {line}: "));
+    let cause = std::error::Error::source(error).map_or_else(String::new, |cause| format!(": {cause}"));
+    Error::Parse { path: source.to_owned(), message: format!("{line}{place}: {error}{cause}") }
+}
+
+/// Reads the file's tree and gathers its faults.
+struct Reader<'a> {
+    source: &'a Path,
+    faults: Vec<WorldFault>,
+}
+
+/// Fields of the file, and of an axis.
+const FIELDS: [&str; 10] = ["name", "description", "world", "seed", "seeds", "design", "points", "settings", "axes", "compare"];
+const AXIS_FIELDS: [&str; 6] = ["setting", "label", "values", "from", "to", "scale"];
+
+impl Reader<'_> {
+    fn error(self) -> Error {
+        let mut faults = self.faults;
+        faults.sort_by_key(|f| f.line);
+        Error::World { path: self.source.to_owned(), faults }
+    }
+
+    fn fault(&mut self, tree: &Node, place: &str, found: impl Into<String>, allowed: impl Into<String>) {
+        let line = tree.locate(place).0;
+        let (place, found, allowed) = (place.to_owned(), found.into(), allowed.into());
+        self.faults.push(WorldFault { place, found, allowed, owner: None, line });
+    }
+
+    fn study(&mut self, tree: &Node, text: &str, seeds: Option<RangeInclusive<u64>>) -> Option<Study> {
+        self.known(tree, tree, "", &FIELDS);
+        let name = self.text(tree, "name")?.to_owned();
+        if name.is_empty() || !name.chars().all(|c| c.is_alphanumeric() || "-_".contains(c)) {
+            self.fault(tree, "name", format!("\"{name}\""), "letters, digits, - and _");
+        }
+        let world = self.world(tree)?;
+        let world_sha256 = match Draft::open(&world).and_then(|draft| draft.world()) {
+            Ok(world) => world.sha256,
+            Err(error) => {
+                self.fault(tree, "world", format!("\"{world}\""), error.to_string());
+                return None;
+            }
+        };
+        let seeds = match seeds {
+            Some(seeds) => seeds,
+            None => self.seeds(tree)?,
+        };
+        let design = match tree.get("design").map(|n| (n, n.text())) {
+            None | Some((_, Some("grid"))) => Design::Grid,
+            Some((_, Some("random"))) => Design::Random,
+            Some((_, Some("sobol"))) => Design::Sobol,
+            Some((node, _)) => {
+                self.fault(tree, "design", node.describe(), "\"grid\", \"random\" or \"sobol\"");
+                return None;
+            }
+        };
+        let settings = self.settings(tree);
+        let axes = self.axes(tree);
+        let points = self.points(tree, design, &axes)?;
+        let seed = self.whole(tree, "seed", 0)?;
+        let compare = tree.get("compare").and_then(Node::text).unwrap_or("method").to_owned();
+        if tree.get("compare").is_some() && !axes.iter().any(|axis| axis.setting == compare) {
+            self.fault(tree, "compare", format!("\"{compare}\""), "the setting of an axis");
+        }
+        let description = tree.get("description").and_then(Node::text).unwrap_or_default().to_owned();
+        let text = text.to_owned();
+        let study =
+            Study { name, description, world, world_sha256, seed, seeds, design, points, settings, axes, compare, text };
+        let size = study.axes.iter().try_fold(study.points * study.episodes_per_cell(), |size, axis| {
+            let levels = if let Levels::Listed(values) = &axis.levels { values.len() as u64 } else { 1 };
+            size.checked_mul(levels).filter(|size| *size <= MOST_EPISODES)
+        });
+        if size.is_none() {
+            self.fault(tree, "axes", "more episodes than that", format!("{MOST_EPISODES} episodes at most"));
+            return None;
+        }
+        Some(study)
+    }
+
+    /// Refuses fields that there are not.
+    fn known(&mut self, tree: &Node, table: &Node, place: &str, fields: &[&str]) {
+        let Read::Table(entries) = &table.value else { return };
+        for (key, _) in entries.iter().filter(|(key, _)| !fields.contains(&key.as_str())) {
+            let place = if place.is_empty() { key.clone() } else { format!("{place}.{key}") };
+            self.fault(tree, &place, "an unknown field", format!("one of {}", fields.join(", ")));
+        }
+    }
+
+    fn text<'n>(&mut self, tree: &'n Node, field: &str) -> Option<&'n str> {
+        let text = tree.get(field).and_then(Node::text);
+        if text.is_none() {
+            let found = tree.get(field).map_or_else(|| "nothing".to_owned(), Node::describe);
+            self.fault(tree, field, found, "a text in quotes, which must be given");
+        }
+        text
+    }
+
+    fn whole(&mut self, tree: &Node, field: &str, usual: u64) -> Option<u64> {
+        let Some(node) = tree.get(field) else { return Some(usual) };
+        let number = if let Read::Integer(n) = node.value { u64::try_from(n).ok() } else { None };
+        if number.is_none() {
+            self.fault(tree, field, node.describe(), "a whole number from 0");
+        }
+        number
+    }
+
+    /// A world file beside the study file, or what `World::open` takes.
+    fn world(&mut self, tree: &Node) -> Option<String> {
+        let given = self.text(tree, "world")?;
+        let beside: PathBuf = self.source.parent().unwrap_or(Path::new("")).join(given);
+        Some(if beside.is_file() { beside.to_string_lossy().into_owned() } else { given.to_owned() })
+    }
+
+    fn seeds(&mut self, tree: &Node) -> Option<RangeInclusive<u64>> {
+        let node = tree.get("seeds");
+        let range = node.and_then(Node::text).and_then(|text| {
+            let (first, last) = text.split_once("..")?;
+            let (first, last) = (first.parse::<u64>().ok()?, last.trim_start_matches('=').parse::<u64>().ok()?);
+            (first <= last && last - first < MOST_EPISODES && last <= i64::MAX as u64).then_some(first..=last)
+        });
+        if range.is_none() {
+            let found = node.map_or_else(|| "nothing".to_owned(), Node::describe);
+            self.fault(tree, "seeds", found, "\"A..B\", both included, the first not above the last, which must be given");
+        }
+        range
+    }
+
+    fn points(&mut self, tree: &Node, design: Design, axes: &[Axis]) -> Option<u64> {
+        let sampled = axes.iter().filter(|axis| matches!(axis.levels, Levels::Between { .. })).count();
+        if design == Design::Grid {
+            if tree.get("points").is_some() {
+                self.fault(tree, "points", "points of a grid", "none: a grid has its axes' levels");
+            }
+            if let Some(k) = axes.iter().position(|axis| matches!(axis.levels, Levels::Between { .. })) {
+                self.fault(tree, &format!("axes[{k}]"), "from and to in a grid", "values, or design = \"random\" or \"sobol\"");
+            }
+            return Some(1);
+        }
+        if sampled == 0 {
+            self.fault(tree, "design", "no axis with from and to", "at least one in a random or Sobol design");
+        }
+        if design == Design::Sobol && sampled > SOBOL_AXES {
+            self.fault(tree, "design", format!("{sampled} axes with from and to"), format!("{SOBOL_AXES} at most"));
+        }
+        let points = self.whole(tree, "points", 0)?;
+        if points == 0 || points > 1 << 31 {
+            self.fault(tree, "points", points.to_string(), "a whole number from 1 to 2147483648");
+        }
+        Some(points.max(1))
+    }
+
+    fn settings(&mut self, tree: &Node) -> Vec<(String, Value)> {
+        let mut found = Vec::new();
+        match tree.get("settings").map(|node| &node.value) {
+            None => {}
+            Some(Read::Table(entries)) => {
+                for (key, node) in entries {
+                    self.setting(tree, key, node, &mut found);
+                }
+            }
+            Some(_) => self.fault(tree, "settings", "no table", "[settings] with a setting a line"),
+        }
+        found
+    }
+
+    /// A setting, or a table of settings that begin with the same words.
+    fn setting(&mut self, tree: &Node, name: &str, node: &Node, found: &mut Vec<(String, Value)>) {
+        if let Read::Table(entries) = &node.value {
+            let inner = |key: &str| format!("{name}.{key}");
+            // A table is a value of its own only in a list's entry, whose shape or texture is set as a whole.
+            if !settings::exists(name) || settings::has_parts(name) {
+                entries.iter().for_each(|(key, node)| self.setting(tree, &inner(key), node, found));
+                return;
+            }
+        }
+        match Value::read(node) {
+            _ if !settings::exists(name) => {
+                let (found, allowed) = ("no setting".to_owned(), settings::near(name));
+                self.faults.push(WorldFault {
+                    place: format!("settings.{name}"),
+                    found,
+                    allowed,
+                    owner: None,
+                    line: node.line,
+                });
+            }
+            Some(value) => found.push((name.to_owned(), value)),
+            None => self.fault(tree, &format!("settings.{name}"), node.describe(), "a number, a text, a list or a table"),
+        }
+    }
+
+    fn axes(&mut self, tree: &Node) -> Vec<Axis> {
+        let Some(node) = tree.get("axes") else {
+            self.fault(tree, "axes", "nothing", "[[axes]], at least one");
+            return Vec::new();
+        };
+        let Read::List(items) = &node.value else {
+            self.fault(tree, "axes", node.describe(), "[[axes]], at least one");
+            return Vec::new();
+        };
+        if items.is_empty() {
+            self.fault(tree, "axes", "an empty list", "at least one axis");
+        }
+        let mut axes: Vec<Axis> = Vec::new();
+        for (k, item) in items.iter().enumerate() {
+            let place = format!("axes[{k}]");
+            self.known(tree, item, &place, &AXIS_FIELDS);
+            let Some(setting) = item.get("setting").and_then(Node::text) else {
+                let found = item.get("setting").map_or_else(|| "nothing".to_owned(), Node::describe);
+                self.fault(tree, &format!("{place}.setting"), found, "the name of a setting in quotes");
+                continue;
+            };
+            if !settings::exists(setting) {
+                self.fault(tree, &format!("{place}.setting"), format!("\"{setting}\""), settings::near(setting));
+            }
+            if axes.iter().any(|axis| axis.setting == setting) {
+                self.fault(tree, &format!("{place}.setting"), format!("\"{setting}\" again"), "one axis a setting");
+            }
+            let Some(levels) = self.levels(tree, item, &place, setting) else { continue };
+            let label = item.get("label").and_then(Node::text).unwrap_or(setting).to_owned();
+            axes.push(Axis { setting: setting.to_owned(), label, levels });
+        }
+        axes
+    }
+
+    fn levels(&mut self, tree: &Node, item: &Node, place: &str, setting: &str) -> Option<Levels> {
+        if let Some(node) = item.get("values") {
+            let place = format!("{place}.values");
+            let Read::List(nodes) = &node.value else {
+                self.fault(tree, &place, node.describe(), "a list of values");
+                return None;
+            };
+            if nodes.is_empty() {
+                self.fault(tree, &place, format!("an empty list for axis \"{setting}\""), "at least one value");
+                return None;
+            }
+            let mut values = Vec::new();
+            for node in nodes {
+                match Value::read(node) {
+                    Some(value) if values.contains(&value) => {
+                        self.fault(tree, &place, format!("{value} twice"), "each value once");
+                    }
+                    Some(value) => values.push(value),
+                    None => self.fault(tree, &place, node.describe(), "numbers, texts, lists or tables"),
+                }
+            }
+            return Some(Levels::Listed(values));
+        }
+        let number = |field: &str| item.get(field).and_then(Value::read).and_then(|value| value.number());
+        let (low, high) = (number("from"), number("to"));
+        let log = item.get("scale").and_then(Node::text) == Some("log");
+        if let Some(scale) = item.get("scale").filter(|scale| !matches!(scale.text(), Some("log" | "linear"))) {
+            self.fault(tree, &format!("{place}.scale"), scale.describe(), "\"linear\" or \"log\"");
+        }
+        match (low, high) {
+            (Some(low), Some(high)) if low < high && (!log || low > 0.0) && (high - low).is_finite() => {
+                Some(Levels::Between { low, high, log })
+            }
+            (Some(low), Some(high)) => {
+                let allowed = if log { "from greater than 0 and less than to" } else { "from less than to" };
+                self.fault(tree, place, format!("from {low} to {high}"), allowed);
+                None
+            }
+            _ => {
+                self.fault(tree, place, format!("an empty axis \"{setting}\""), "values = [...], or from and to as numbers");
+                None
+            }
+        }
+    }
+}

@@ -1,0 +1,293 @@
+//! Counting what the rows of a study say.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+use super::rows::{ERROR, PANIC, Row};
+use super::spec::{Axis, Levels, Study};
+use crate::episode::Outcome;
+use crate::study::statistics::{Paired, cluster_bootstrap_95, quantile, wilson_95};
+
+/// Classes that the range of a sampled axis is cut into.
+const CLASSES: usize = 6;
+
+/// An axis cut into the levels that a figure shows.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Scale {
+    /// Which of the study's axes.
+    pub axis: usize,
+    /// What figures call the axis.
+    pub label: String,
+    /// What they call its levels.
+    pub levels: Vec<String>,
+}
+
+impl Scale {
+    /// That of an axis: its listed values, or classes of its range.
+    #[must_use]
+    pub fn of(study: &Study, axis: usize) -> Self {
+        let Axis { label, levels, .. } = &study.axes[axis];
+        let levels = match levels {
+            Levels::Listed(values) => values.iter().map(ToString::to_string).collect(),
+            Levels::Between { low, high, log } => (0..CLASSES)
+                .map(|k| {
+                    let rim = |k: usize| between(*low, *high, *log, k as f64 / CLASSES as f64);
+                    format!("{}\u{2013}{}", short(rim(k)), short(rim(k + 1)))
+                })
+                .collect(),
+        };
+        Self { axis, label: label.clone(), levels }
+    }
+
+    /// The level that a row belongs to.
+    #[must_use]
+    pub fn level(&self, study: &Study, row: &Row) -> usize {
+        match &study.axes[self.axis].levels {
+            Levels::Listed(values) => values.iter().position(|v| *v == row.values[self.axis]).unwrap_or_default(),
+            Levels::Between { low, high, log } => {
+                let value = row.values[self.axis].number().unwrap_or(*low);
+                let share = if *log { libm::log(value / low) / libm::log(high / low) } else { (value - low) / (high - low) };
+                ((share * CLASSES as f64) as usize).min(CLASSES - 1)
+            }
+        }
+    }
+}
+
+fn between(low: f64, high: f64, log: bool, share: f64) -> f64 {
+    if log { low * libm::pow(high / low, share) } else { low + share * (high - low) }
+}
+
+/// A number with two significant digits or so.
+fn short(value: f64) -> String {
+    let decimals = if value.abs() >= 10.0 {
+        0
+    } else if value.abs() >= 1.0 {
+        1
+    } else {
+        2
+    };
+    let text = format!("{value:.decimals$}");
+    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
+}
+
+/// Some rows in numbers.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Tally {
+    /// Episodes.
+    pub runs: usize,
+    /// Those that came home.
+    pub home: usize,
+    /// 95 % Wilson interval of their share.
+    pub home_share_95: [f64; 2],
+    /// Those that claimed to be home elsewhere.
+    pub wrong_claims: usize,
+    /// Those that ended otherwise: timeout, lost, stuck, panic, error.
+    pub others: [usize; 5],
+    /// Quartiles of time over straight-line time, of those that came home.
+    pub time_ratio: [Option<f64>; 3],
+    /// Median distance from home at the end, m.
+    pub final_distance_m: Option<f64>,
+    /// Episodes with a collision.
+    pub collided: usize,
+}
+
+/// Names of [`Tally::others`].
+pub const OTHERS: [&str; 5] = ["timeout", "lost", "stuck", PANIC, ERROR];
+
+impl Tally {
+    /// Of these rows.
+    #[must_use]
+    pub fn of<'a>(rows: impl Iterator<Item = &'a Row> + Clone) -> Self {
+        let count = |holds: &dyn Fn(&Row) -> bool| rows.clone().filter(|row| holds(row)).count();
+        let runs = rows.clone().count();
+        let home = count(&Row::is_home);
+        let ratios: Vec<f64> = rows.clone().filter_map(|row| row.measure("time_ratio")).collect();
+        let finals: Vec<f64> = rows.clone().filter_map(|row| row.measure("final_distance_m")).collect();
+        Self {
+            runs,
+            home,
+            home_share_95: wilson_95(home, runs),
+            wrong_claims: count(&Row::is_wrong_claim),
+            others: OTHERS.map(|name| count(&|row| row.outcome == name)),
+            time_ratio: [0.25, 0.5, 0.75].map(|share| quantile(&ratios, share)),
+            final_distance_m: quantile(&finals, 0.5),
+            collided: count(&|row| row.count("collisions").is_some_and(|n| n > 0)),
+        }
+    }
+
+    /// Share that came home.
+    #[must_use]
+    pub fn share(&self) -> f64 {
+        self.home as f64 / self.runs.max(1) as f64
+    }
+}
+
+/// Two levels of the compared axis, seed by seed.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Duel {
+    /// The levels.
+    pub levels: [usize; 2],
+    /// Of all cells together.
+    pub all: Paired,
+    /// Difference of the shares that came home, and its 95 % interval by a bootstrap over seeds.
+    pub success: Option<(f64, [f64; 2])>,
+    /// Mean difference of the time ratios where both came home, and its interval by the same bootstrap.
+    pub time_ratio: Option<(f64, [f64; 2])>,
+    /// Pairs and those in which both came home, by seed: (difference of successes, pairs), (difference of time ratios, pairs).
+    pairs: Vec<(u64, u64, bool, bool)>,
+}
+
+/// The axis whose levels are compared; `None` where the study has no such axis, or it has one level.
+#[must_use]
+pub fn compared(study: &Study) -> Option<usize> {
+    study
+        .axes
+        .iter()
+        .position(|axis| axis.setting == study.compare && matches!(&axis.levels, Levels::Listed(values) if values.len() > 1))
+}
+
+/// Compares every two levels of the compared axis: all runs that differ in nothing else are a pair.
+#[must_use]
+pub fn duels(study: &Study, rows: &[Row]) -> Vec<Duel> {
+    let Some(axis) = compared(study) else { return Vec::new() };
+    let scale = Scale::of(study, axis);
+    let stride: u64 = study.axes[axis + 1..]
+        .iter()
+        .map(|a| if let Levels::Listed(values) = &a.levels { values.len() as u64 } else { 1 })
+        .product();
+    // Cell without its level on the axis, and seed.
+    let mut pairs: BTreeMap<(u64, u64), Vec<Option<&Row>>> = BTreeMap::new();
+    for row in rows {
+        let level = scale.level(study, row);
+        let key = (row.cell - level as u64 * stride, row.seed);
+        pairs.entry(key).or_insert_with(|| vec![None; scale.levels.len()])[level] = Some(row);
+    }
+    let count = scale.levels.len();
+    let levels = (0..count).flat_map(|a| (a + 1..count).map(move |b| [a, b]));
+    levels.map(|levels| Duel::new(levels, &pairs)).collect()
+}
+
+impl Duel {
+    fn new(levels: [usize; 2], pairs: &BTreeMap<(u64, u64), Vec<Option<&Row>>>) -> Self {
+        let mut all = Paired::default();
+        let (mut successes, mut ratios): (BTreeMap<u64, (f64, usize)>, BTreeMap<u64, (f64, usize)>) = Default::default();
+        let mut kept = Vec::new();
+        for (&(cell, seed), rows) in pairs {
+            let (Some(a), Some(b)) = (rows[levels[0]], rows[levels[1]]) else { continue };
+            all.add(a.is_home(), b.is_home());
+            kept.push((cell, seed, a.is_home(), b.is_home()));
+            let success = successes.entry(seed).or_default();
+            *success = (success.0 + f64::from(i8::from(a.is_home()) - i8::from(b.is_home())), success.1 + 1);
+            if let (Some(x), Some(y)) = (a.measure("time_ratio"), b.measure("time_ratio")) {
+                let ratio = ratios.entry(seed).or_default();
+                *ratio = (ratio.0 + x - y, ratio.1 + 1);
+            }
+        }
+        let bootstrap =
+            |clusters: BTreeMap<u64, (f64, usize)>| cluster_bootstrap_95(&clusters.into_values().collect::<Vec<_>>());
+        Self { levels, all, success: bootstrap(successes), time_ratio: bootstrap(ratios), pairs: kept }
+    }
+
+    /// The pairs whose first one's cell (that of the compared axis' first level) `choose` takes.
+    #[must_use]
+    pub fn within(&self, choose: impl Fn(u64) -> bool) -> Paired {
+        let mut some = Paired::default();
+        for &(cell, _, a, b) in &self.pairs {
+            if choose(cell) {
+                some.add(a, b);
+            }
+        }
+        some
+    }
+}
+
+/// Failures worth a look, at most `most`: of each level of the compared axis and each outcome the first ones, in turn, none of a
+/// cell where all runs end alike before those where they do not.
+#[must_use]
+pub fn failures<'a>(study: &Study, rows: &'a [Row], most: usize) -> Vec<&'a Row> {
+    let scale = compared(study).map(|axis| Scale::of(study, axis));
+    let mut home_in_cell: BTreeMap<u64, usize> = BTreeMap::new();
+    for row in rows.iter().filter(|row| row.is_home()) {
+        *home_in_cell.entry(row.cell).or_default() += 1;
+    }
+    let mut kinds: BTreeMap<(usize, usize), Vec<&Row>> = BTreeMap::new();
+    for row in rows {
+        let level = scale.as_ref().map_or(0, |scale| scale.level(study, row));
+        // A run without a result has no path to show.
+        let shown = [Outcome::Lost, Outcome::Timeout, Outcome::Stuck];
+        if let Some(outcome) = shown.iter().position(|o| o.name() == row.outcome) {
+            kinds.entry((outcome, level)).or_default().push(row);
+        }
+    }
+    for rows in kinds.values_mut() {
+        // The rarer a failure in its cell, the more there is to learn from it.
+        rows.sort_by_key(|row| (std::cmp::Reverse(home_in_cell.get(&row.cell).copied().unwrap_or_default()), row.episode));
+    }
+    let mut chosen = Vec::new();
+    for turn in 0.. {
+        let before = chosen.len();
+        chosen.extend(kinds.values().filter_map(|rows| rows.get(turn)).take(most - before));
+        if chosen.len() == before || chosen.len() == most {
+            break;
+        }
+    }
+    chosen
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::path::Path;
+    use std::sync::Arc;
+
+    const STUDY: &str = "name = \"t\"\nworld = \"lab\"\nseeds = \"1..4\"\ndesign = \"random\"\npoints = 2\n\
+        [[axes]]\nsetting = \"method\"\nvalues = [\"alv\", \"ibvs\", \"weber\"]\n\
+        [[axes]]\nsetting = \"floor_friction\"\nfrom = 0.1\nto = 0.7\n\
+        [[axes]]\nsetting = \"hidden_share\"\nvalues = [0.0, 0.5]\n";
+
+    /// A study's rows, home where `home` says so of cell, method and seed.
+    fn made(home: impl Fn(&str, u64) -> bool) -> (Study, Vec<Row>) {
+        let study = Study::from_toml(STUDY, Path::new("t.toml"), None).unwrap();
+        let rows = (0..study.episodes()).map(|episode| {
+            let (cell, seed) = study.place(episode);
+            let values: Arc<[_]> = study.values(cell).into();
+            let outcome = if home(values[0].text().unwrap(), seed) { "home" } else { "lost" };
+            Row::without_result(episode, (cell, seed), &values, outcome, String::new())
+        });
+        (study.clone(), rows.collect())
+    }
+
+    #[test]
+    fn pairs_differ_in_the_compared_setting_alone() {
+        let (study, rows) = made(|method, seed| method == "alv" || (method == "ibvs" && seed < 4));
+        assert_eq!((study.cells(), study.episodes()), (12, 48));
+        let duels = duels(&study, &rows);
+        assert_eq!(duels.len(), 3);
+        let [alv_ibvs, alv_weber, _] = &duels[..] else { panic!() };
+        // Two points and two shares, three of four seeds each.
+        assert_eq!(alv_ibvs.all, Paired { both: 12, only_first: 4, only_second: 0, neither: 0 });
+        assert_eq!(alv_weber.all, Paired { both: 0, only_first: 16, only_second: 0, neither: 0 });
+        assert_eq!(alv_weber.success, Some((1.0, [1.0, 1.0])));
+        let (difference, [low, high]) = alv_ibvs.success.unwrap();
+        assert!(difference == 0.25 && low == 0.0 && high > 0.4, "one seed of four decides: {low} to {high}");
+        assert_eq!(alv_ibvs.within(|cell| cell == 0).trials(), 4);
+        assert_eq!(alv_ibvs.time_ratio, None);
+    }
+
+    #[test]
+    fn levels_and_tallies_cover_all_rows() {
+        let (study, rows) = made(|_, seed| seed % 2 == 0);
+        for axis in 0..3 {
+            let scale = Scale::of(&study, axis);
+            let counts = (0..scale.levels.len())
+                .map(|level| Tally::of(rows.iter().filter(|row| scale.level(&study, row) == level)))
+                .collect::<Vec<_>>();
+            assert_eq!(counts.iter().map(|t| t.runs).sum::<usize>(), 48);
+            assert!(counts.iter().all(|t| t.runs == 2 * t.home && t.runs == t.home + t.others[1]));
+        }
+        assert_eq!(Scale::of(&study, 1).levels[0], "0.1\u{2013}0.2");
+        assert_eq!(failures(&study, &rows, 7).len(), 7);
+        assert_eq!([short(0.05), short(12.3), short(1.25), short(10.0)], ["0.05", "12", "1.2", "10"]);
+    }
+}
