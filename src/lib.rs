@@ -57,7 +57,7 @@
 //!
 //! Each module imports only what lies below it. From the top: the command line; `report`; `study`; `episode`; then side by
 //! side and blind to one another `physics`, `render`, `vision`, `estimation` and `control`; then `world`, `panorama` and
-//! `observation`; at the bottom [`geometry`], [`ode`], [`random`] streams, [`table`]s and [`error`]s.
+//! `observation`; at the bottom [`geometry`], [`ode`], [`random`] streams, [`table`]s, [`storage`] and [`error`]s.
 //!
 //! # Units and randomness
 //!
@@ -77,6 +77,7 @@ pub mod physics;
 pub mod random;
 pub mod render;
 pub mod report;
+pub mod storage;
 pub mod study;
 pub mod table;
 pub mod vision;

@@ -101,6 +101,8 @@ pub enum Command {
     Render(Box<RenderArgs>),
     /// How fast the renderer is and what it shows: a page with the speeds, and sheets of all worlds and presets
     RenderReport(RenderReportArgs),
+    /// Panorama sets with ground truth in the field's layouts; their check; how fast they are made
+    Dataset(Box<super::dataset::DatasetArgs>),
     /// Check, draw and describe world files
     World(WorldArgs),
 }
@@ -136,6 +138,8 @@ pub struct HomeArgs {
     pub size: Option<(u32, u32)>,
     #[command(flatten)]
     pub look: LookArgs,
+    #[command(flatten)]
+    pub set: super::dataset::SetArgs,
     /// Light at home, if another than on the way
     #[arg(long, value_parser = choice(LIGHTS))]
     pub home_light: Option<LightPreset>,
@@ -399,6 +403,7 @@ pub const BEARINGS: &[Choice<Bearings>] = &[
     (Bearings::Rendered, "rendered", "Features of rendered panoramas, found again from the home panorama"),
     (Bearings::Ideal, "ideal", "True bearings of the landmark bodies' centres, where nothing hides them"),
     (Bearings::Noisy, "noisy", "Ideal bearings with noise, drop-outs and false matches"),
+    (Bearings::Dataset, "dataset", "Features of the panoramas of a set on disk, see --dataset"),
 ];
 
 const LAWS: &[Choice<LawKind>] = &[

@@ -64,10 +64,22 @@ impl Context {
             return Ok(ProgressBar::hidden());
         }
         let template = if length.is_some() { "{bar:32} {pos}/{len} {elapsed} {msg}" } else { "{spinner} {elapsed} {msg}" };
-        let style = ProgressStyle::with_template(template).context("progress template")?;
-        let bar = ProgressBar::with_draw_target(length, ProgressDrawTarget::stderr_with_hz(8));
-        Ok(bar.with_style(style))
+        styled(length, template)
     }
+
+    /// A progress bar with rate and time left, for long work of many like things; it is silent when nobody watches.
+    pub fn work(&self, length: u64) -> Result<ProgressBar> {
+        if !self.show_progress {
+            return Ok(ProgressBar::hidden());
+        }
+        styled(Some(length), "{bar:32} {pos}/{len}, {per_sec}, {eta} left")
+    }
+}
+
+fn styled(length: Option<u64>, template: &str) -> Result<ProgressBar> {
+    let style = ProgressStyle::with_template(template).context("progress template")?;
+    let bar = ProgressBar::with_draw_target(length, ProgressDrawTarget::stderr_with_hz(8));
+    Ok(bar.with_style(style))
 }
 
 /// Writes to stdout. A reader that has had enough (`| head`) is no error.

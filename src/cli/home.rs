@@ -130,7 +130,10 @@ fn setup(args: &HomeArgs) -> Result<Setup, Error> {
     let noisy = args.noise_deg.is_some() || args.noise_dropout.is_some() || args.noise_false.is_some();
     needs_bearings(noisy, "--noise-*", args.bearings, Bearings::Noisy)?;
     needs_bearings(args.size.is_some(), "--size", args.bearings, Bearings::Rendered)?;
-    needs_bearings(args.landmarks.is_some(), "--landmarks", args.bearings, Bearings::Rendered)?;
+    needs_bearings(args.set.is_given(), "--dataset*", args.bearings, Bearings::Dataset)?;
+    if args.bearings != Bearings::Dataset {
+        needs_bearings(args.landmarks.is_some(), "--landmarks", args.bearings, Bearings::Rendered)?;
+    }
     let (look, home_look) = (args.look.look(), Look { light: args.home_light, camera: args.home_camera });
     needs_bearings(look.or(home_look) != Look::default(), "--light and --camera", args.bearings, Bearings::Rendered)?;
     let usual = Noise::default();
@@ -146,6 +149,7 @@ fn setup(args: &HomeArgs) -> Result<Setup, Error> {
         extractor,
         look,
         home_look,
+        dataset: args.set.choice(),
         noise: Noise {
             sd_rad: args.noise_deg.map_or(usual.sd_rad, f64::to_radians),
             dropout: args.noise_dropout.unwrap_or(usual.dropout),

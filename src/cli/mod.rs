@@ -7,6 +7,7 @@ pub mod args;
 mod bound;
 mod compare;
 mod context;
+mod dataset;
 mod drive;
 mod home;
 mod method_args;
@@ -39,6 +40,7 @@ pub enum Verdict {
 pub fn run(args: Args) -> Result<Verdict> {
     let context = Context::new(&args.common)?;
     match args.command {
+        Command::Dataset(args) => dataset::run(&args, &context),
         Command::Drive(args) => drive::run(&args, &context),
         Command::Home(args) => home::run(&args, &context),
         Command::PhysicsReport(args) => physics_report::run(&args, &context),

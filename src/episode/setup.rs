@@ -10,7 +10,8 @@ use super::record::Record;
 use super::recorder::Recorder;
 use super::run::{Parts, Progress, run_recorded};
 use super::sensor::{
-    CompassSensor, Degradation, DegradedSensor, IdealSensor, Noise, NoisySensor, RenderedSensor, Sensor, Sight,
+    CompassSensor, DatasetChoice, DatasetField, DatasetSensor, Degradation, DegradedSensor, IdealSensor, Noise, NoisySensor,
+    RenderedSensor, Sensor, Sight,
 };
 use crate::error::{Error, Result};
 use crate::estimation::anchored::FilterSettings;
@@ -43,6 +44,8 @@ pub enum Bearings {
     Ideal,
     /// Ideal bearings with noise, drop-outs and false matches.
     Noisy,
+    /// Features of panoramas on disk, matched to those of the set's home panorama.
+    Dataset,
 }
 
 /// Light and camera of [`Bearings::Rendered`]. What is `None` is as the world has it.
@@ -120,6 +123,8 @@ pub struct Setup {
     pub look: Look,
     /// Light and camera of the home panorama; what is `None` is as in `look`.
     pub home_look: Look,
+    /// The set of [`Bearings::Dataset`].
+    pub dataset: Option<DatasetChoice>,
     /// Faults of [`Bearings::Noisy`].
     pub noise: Noise,
     /// What is done to the bearings of any sensor on top of that.
@@ -150,6 +155,7 @@ impl Default for Setup {
             extractor: ExtractorSettings::default(),
             look: Look::default(),
             home_look: Look::default(),
+            dataset: None,
             noise: Noise::default(),
             degradation: Degradation::default(),
             compass_sd_rad: None,
@@ -218,6 +224,7 @@ pub struct Bench<'a> {
     world: &'a World,
     setup: &'a Setup,
     camera: Option<Camera>,
+    dataset: Option<Arc<DatasetField>>,
 }
 
 /// What rendered bearings need, kept from run to run.
@@ -231,7 +238,7 @@ impl<'a> Bench<'a> {
     /// Packs the world and opens the renderer where the setup needs them.
     ///
     /// # Errors
-    /// When the method's program is not there, the world cannot be packed or the renderer cannot be had.
+    /// When the method's program is not there, the world cannot be packed, the renderer cannot be had, or the set cannot be opened.
     pub fn new(world: &'a World, setup: &'a Setup) -> Result<Self> {
         setup.method.check()?;
         let camera = match setup.bearings {
@@ -240,9 +247,10 @@ impl<'a> Bench<'a> {
                 let scenes = setup.looks().map(|look| Arc::new(look.scene(&scene, world)));
                 Some(Camera { scenes, renderer: render::create(setup.renderer)? })
             }
-            Bearings::Ideal | Bearings::Noisy => None,
+            Bearings::Ideal | Bearings::Noisy | Bearings::Dataset => None,
         };
-        Ok(Self { world, setup, camera })
+        let dataset = field(world, setup)?;
+        Ok(Self { world, setup, camera, dataset })
     }
 
     /// The packed world as it was at home and as it is on the way; `None` for a sensor without a camera.
@@ -255,13 +263,14 @@ impl<'a> Bench<'a> {
     /// textures above all, takes longer than a short run.
     ///
     /// # Errors
-    /// When the renderer cannot be had.
+    /// When the renderer cannot be had, or the set cannot be opened.
     pub fn with_scenes(world: &'a World, setup: &'a Setup, scenes: [Arc<Scene>; 2]) -> Result<Self> {
         let camera = match setup.bearings {
             Bearings::Rendered => Some(Camera { scenes, renderer: render::create(setup.renderer)? }),
-            Bearings::Ideal | Bearings::Noisy => None,
+            Bearings::Ideal | Bearings::Noisy | Bearings::Dataset => None,
         };
-        Ok(Self { world, setup, camera })
+        let dataset = field(world, setup)?;
+        Ok(Self { world, setup, camera, dataset })
     }
 
     /// A second bench for another thread; it shares the packed world and has a renderer of its own.
@@ -273,7 +282,7 @@ impl<'a> Bench<'a> {
             Some(camera) => Some(Camera { scenes: camera.scenes.clone(), renderer: render::create(self.setup.renderer)? }),
             None => None,
         };
-        Ok(Self { camera, ..*self })
+        Ok(Self { camera, dataset: self.dataset.clone(), ..*self })
     }
 
     /// Runs the episode of one seed. `watch` is called once a control step and stops the run with `Break`.
@@ -335,18 +344,19 @@ impl<'a> Bench<'a> {
     pub fn sensor(&mut self, seed: Seed) -> Result<Box<dyn Sensor + '_>> {
         let (world, setup) = (self.world, self.setup);
         let ideal = || IdealSensor::new(world);
-        let mut sensor: Box<dyn Sensor + '_> = match &mut self.camera {
-            Some(Camera { scenes: [home, now], renderer }) => {
+        let mut sensor: Box<dyn Sensor + '_> = match (&mut self.camera, &self.dataset) {
+            (Some(Camera { scenes: [home, now], renderer }), _) => {
                 let [home_look, look] = setup.looks();
                 let sights =
                     [Sight { scene: home, optics: home_look.optics(world) }, Sight { scene: now, optics: look.optics(world) }];
                 let (projection, settings) = (setup.projection(world), setup.extractor.clone());
                 Box::new(RenderedSensor::new(world, sights, renderer.as_mut(), projection, settings, seed)?)
             }
-            None if setup.bearings == Bearings::Noisy => {
+            (None, Some(field)) => Box::new(DatasetSensor::new(world, Arc::clone(field), setup.extractor.clone())),
+            (None, None) if setup.bearings == Bearings::Noisy => {
                 Box::new(NoisySensor::new(ideal(), world.landmark_count, setup.noise, seed))
             }
-            None => Box::new(ideal()),
+            (None, None) => Box::new(ideal()),
         };
         if !setup.degradation.is_none() {
             sensor = Box::new(DegradedSensor::new(sensor, setup.degradation, seed)?);
@@ -355,6 +365,19 @@ impl<'a> Bench<'a> {
             sensor = Box::new(CompassSensor::new(sensor, world.home, sd_rad, seed)?);
         }
         Ok(sensor)
+    }
+}
+
+/// The set that bearings come from, where they come from one.
+fn field(world: &World, setup: &Setup) -> Result<Option<Arc<DatasetField>>> {
+    match (setup.bearings, &setup.dataset) {
+        (Bearings::Dataset, Some(choice)) => Ok(Some(Arc::new(DatasetField::new(world, choice)?))),
+        (Bearings::Dataset, None) => Err(Error::Invalid {
+            what: "set for --bearings dataset".into(),
+            found: "none".into(),
+            allowed: "the folder of one, with `home --dataset DIR`".into(),
+        }),
+        _ => Ok(None),
     }
 }
 

@@ -1,10 +1,46 @@
-//! Panorama sets: a panorama at every place of a grid, all taken with the same heading.
+//! Panorama sets on disk: the layouts of the field, written and read back.
 //!
-//! A [`Grid`] says where the places are, a [`PanoramaSet`] reads the pictures of a set on disk. Whatever a set's own sense of
-//! azimuth and elevation, [`PanoramaSet::load`] gives a [`Panorama`](crate::panorama::Panorama) in this project's projection.
+//! A [`Layout`] says how a set's files are named, how their pixels are coded and which way azimuth runs over the columns; each has
+//! a file of its own here that holds both directions, so that what is written in a layout is read back equal. A set that this
+//! program wrote carries a [`Document`] (`dataset.json`); real sets have none, and then the layout's own conventions hold.
+//!
+//! | layout | pictures | columns | rows |
+//! |---|---|---|---|
+//! | `vardy` | `CONDITION/I_J.pgm`, grey | azimuth falls | even in elevation, horizon in the middle |
+//! | `moeller` | `DATA2/BASE_SUFFIX.db`, `DATA2/BASECONDITIONSUFFIX/cv_X_Y_bwBW.pgm`, grey, X counts backwards | azimuth falls | even in elevation, horizon as the `.db` says |
+//! | `image-database` | `CONDITION/database_entries.csv`, `database_metadata.yaml`, PNG | azimuth grows | even in its tangent |
+//! | `webdataset` | `shards/CONDITION-N.tar` with `KEY.rgb.png`, `.range.png`, `.instance.png`, `.json` | azimuth grows | even in its tangent |
+//! | `folder` | `CONDITION/N.rgb.png`, `.range.png`, `.instance.png`, `.json` | azimuth grows | even in its tangent |
+//! | `paper` (read only) | `I_J.png` or `.pgm` | azimuth grows | even in its tangent |
+//!
+//! The first three have no place for range and instances; they lie in `truth/CONDITION/`, where no reader of the layout looks.
+//!
+//! Whatever a set's own sense of azimuth, [`PanoramaSet::load`] gives a [`Panorama`](crate::panorama::Panorama) whose columns run
+//! anti-clockwise. A [`Grid`] says where the places of a set lie about its home.
 
-mod files;
+mod decode;
+mod document;
+mod encode;
+mod entry;
+mod folder;
 mod grid;
+mod image_database;
+mod layout;
+mod moeller;
+mod set;
+mod vardy;
+mod webdataset;
+mod yaml;
 
-pub use files::{Layout, PanoramaSet};
+pub use decode::mirror;
+pub use document::{ConditionDocument, DOCUMENT, Document, GridDocument, Instance};
+pub use encode::{
+    Coding, encode_grey, encode_instance, encode_range, encode_rgb, modes, packed_instance, packed_range, packed_rgb,
+};
+pub use entry::{Entry, Frame, FramePose, FrameTruth, LandmarkTruth, Names};
 pub use grid::{Cell, Grid, Place};
+pub use image_database::{ENTRIES, METADATA, entries_csv, metadata_yaml};
+pub use layout::Layout;
+pub use moeller::{BANDWIDTH, database_line, database_name};
+pub use set::PanoramaSet;
+pub use webdataset::{Shard, shard_name};

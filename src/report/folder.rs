@@ -6,11 +6,10 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use crate::error::{Error, Result};
+use crate::storage::{self, PARTIAL, io_error, write_atomically};
 
 /// File that marks a folder as ours; it holds the name of the verb that writes it.
 pub(super) const MARKER: &str = ".wayhome";
-/// Ending of files that are still being written.
-pub(super) const PARTIAL: &str = ".wayhome-partial";
 
 /// A folder of results that one verb of the program writes.
 ///
@@ -82,18 +81,15 @@ impl OutputFolder {
     /// As [`Self::write`].
     pub fn begin(&self, name: &'static str) -> Result<GrowingFile> {
         assert!(self.names.contains(&name), "`{name}` is not announced");
-        let path = self.path.join(name);
-        let partial = partial_name(&path);
-        let file = fs::File::create(&partial).map_err(io_error("write", &path))?;
-        Ok(GrowingFile { name, path, partial, writer: io::BufWriter::new(file) })
+        Ok(GrowingFile { name, path: self.path.join(name), file: storage::GrowingFile::create(&self.path.join(name))? })
     }
 
     /// Puts a file that was written piece by piece in its place.
     ///
     /// # Errors
     /// When what is left of it cannot be written.
-    pub fn complete(&mut self, mut file: GrowingFile) -> Result<()> {
-        file.writer.flush().and_then(|()| fs::rename(&file.partial, &file.path)).map_err(io_error("write", &file.path))?;
+    pub fn complete(&mut self, file: GrowingFile) -> Result<()> {
+        file.file.complete()?;
         self.written.insert(file.name.to_owned());
         Ok(())
     }
@@ -141,8 +137,7 @@ fn is_numbered(name: &str, file: &str) -> bool {
 pub struct GrowingFile {
     name: &'static str,
     path: PathBuf,
-    partial: PathBuf,
-    writer: io::BufWriter<fs::File>,
+    file: storage::GrowingFile,
 }
 
 impl GrowingFile {
@@ -151,37 +146,8 @@ impl GrowingFile {
     /// # Errors
     /// When it cannot be written.
     pub fn append(&mut self, text: &str) -> Result<()> {
-        self.writer.write_all(text.as_bytes()).map_err(io_error("write", &self.path))
+        self.file.write_all(text.as_bytes()).map_err(io_error("write", &self.path))
     }
-}
-
-impl Drop for GrowingFile {
-    fn drop(&mut self) {
-        // Best effort, and nothing to do once it is complete: the next run would remove it too.
-        let _ = fs::remove_file(&self.partial);
-    }
-}
-
-/// Writes a file under another name and renames it, so that it is never seen half written.
-///
-/// # Errors
-/// When the file cannot be written.
-pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<()> {
-    let partial = partial_name(path);
-    fs::write(&partial, bytes).and_then(|()| fs::rename(&partial, path)).map_err(|source| {
-        // Best effort: the write itself is what failed and what the caller hears about.
-        let _ = fs::remove_file(&partial);
-        Error::Io { action: "write", path: path.to_owned(), source }
-    })
-}
-
-/// What a file is called while it is written: a name that no other process takes at the same time, on this machine or on another
-/// one that sees the folder.
-pub(super) fn partial_name(path: &Path) -> PathBuf {
-    let since = std::time::UNIX_EPOCH.elapsed().unwrap_or_default();
-    let mut name = path.file_name().unwrap_or_default().to_owned();
-    name.push(format!(".{:x}-{:x}{PARTIAL}", std::process::id(), since.as_nanos()));
-    path.with_file_name(name)
 }
 
 pub(super) fn remove(path: &Path) -> Result<()> {
@@ -191,10 +157,6 @@ pub(super) fn remove(path: &Path) -> Result<()> {
         }
         _ => Ok(()),
     }
-}
-
-pub(super) fn io_error(action: &'static str, path: &Path) -> impl Fn(io::Error) -> Error {
-    move |source| Error::Io { action, path: path.to_owned(), source }
 }
 
 #[cfg(test)]

@@ -6,6 +6,7 @@
 pub mod bound;
 pub mod chart;
 pub mod compare;
+pub mod dataset;
 pub mod drive;
 mod folder;
 pub mod image;
@@ -24,7 +25,8 @@ pub mod text;
 mod tum;
 pub mod vision;
 
-pub use folder::{GrowingFile, OutputFolder, write_atomically};
+pub use crate::storage::write_atomically;
+pub use folder::{GrowingFile, OutputFolder};
 
 /// Indented JSON with a line end.
 pub fn json(value: &impl serde::Serialize) -> String {

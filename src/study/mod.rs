@@ -2,6 +2,7 @@
 
 pub mod bound;
 pub mod compare;
+pub mod dataset;
 pub mod film;
 pub mod observability;
 pub mod paper;

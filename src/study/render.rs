@@ -172,7 +172,7 @@ pub fn measure(effort: Effort, tell: &mut dyn FnMut(&Speed) -> Result<()>) -> Re
 }
 
 /// Name of the processor, where the system tells it.
-fn processor() -> String {
+pub(super) fn processor() -> String {
     let known = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
     let line = known.lines().find_map(|l| l.strip_prefix("model name")?.split_once(':'));
     line.map_or_else(|| std::env::consts::ARCH.to_owned(), |(_, name)| name.trim().to_owned())

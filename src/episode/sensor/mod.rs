@@ -1,11 +1,12 @@
 //! Sensors of bearings: where the truth becomes an observation.
 //!
-//! A sensor belongs to the simulator, so it sees the true poses; what it gives to the method are bearings only. Three kinds:
-//! [`RenderedSensor`] looks through the camera and the feature extractor, [`IdealSensor`] takes the bearings of the landmark
+//! A sensor belongs to the simulator, so it sees the true poses; what it gives to the method are bearings only. Four kinds:
+//! [`RenderedSensor`] looks through the camera and the feature extractor, [`DatasetSensor`] at panoramas on disk, [`IdealSensor`] takes the bearings of the landmark
 //! bodies from geometry, and [`NoisySensor`] spoils those with noise, drop-outs and false matches. A [`DegradedSensor`] makes any
 //! of them worse, for studies of robustness; a [`CompassSensor`] adds a compass to any of them.
 
 mod compass;
+mod dataset;
 mod degraded;
 mod ideal;
 mod noisy;
@@ -13,6 +14,7 @@ mod rendered;
 mod sight;
 
 pub use compass::CompassSensor;
+pub use dataset::{DatasetChoice, DatasetField, DatasetSensor};
 pub use degraded::{Degradation, DegradedSensor};
 pub use ideal::IdealSensor;
 pub use noisy::{Noise, NoisySensor};

@@ -5,7 +5,7 @@ use std::io::{self, BufWriter, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
 use crate::error::{Error, Result};
-use crate::report::folder::{io_error, partial_name};
+use crate::storage::{io_error, partial_name};
 
 /// What every recording holds near its beginning, so that a later one knows that it may take its place.
 pub(super) const MAKER: &str = "wayhome";

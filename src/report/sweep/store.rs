@@ -12,8 +12,9 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Result};
-use crate::report::folder::{MARKER, PARTIAL, files, io_error, remove};
+use crate::report::folder::{MARKER, files, remove};
 use crate::report::{OutputFolder, json, run as run_report, write_atomically};
+use crate::storage::{PARTIAL, io_error};
 use crate::study::sweep::merge::{Identity, merge};
 use crate::study::sweep::{Chunk, Failure, Row, Store, Study, rows};
 use crate::table::Table;

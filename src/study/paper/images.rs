@@ -65,7 +65,7 @@ impl ImageSet {
     /// # Errors
     /// When it is not whole or has another grid.
     pub fn open(self, folder: &Path) -> Result<PanoramaSet> {
-        let (files, grid) = (PanoramaSet::open(folder, self.layout())?, self.grid());
+        let (files, grid) = (PanoramaSet::open_as(folder, self.layout())?.whole()?, self.grid());
         if files.shape() != (grid.rows, grid.columns) {
             return Err(Error::Invalid {
                 what: format!("grid of the set in {}", folder.display()),
@@ -115,7 +115,7 @@ impl ImageCase {
         let (home, field) = match folder {
             Some(folder) => {
                 let files = set.open(folder)?;
-                ObjectField::extract(grid, &set.extractor(), &|place| files.load(place))?
+                ObjectField::extract(grid, &set.extractor(), &|place| files.at(place))?
             }
             None => {
                 let scene = Scene::new(&world)?;

@@ -1,0 +1,159 @@
+//! Frames: as they are written, with their truth, and as they are found on disk.
+
+use std::path::PathBuf;
+
+use serde::{Deserialize, Serialize};
+
+use super::grid::Place;
+use crate::geometry::Pose;
+
+/// A frame to be written: one panorama of a set.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Frame {
+    /// Number in the whole set: condition by condition, with those counted that were left out.
+    pub number: usize,
+    /// Number within the condition. The same pose has the same one in every condition.
+    pub spot: usize,
+    /// Short name of the condition, as folders and keys have it.
+    pub condition: String,
+    /// Place of the grid.
+    pub place: Option<Place>,
+    /// Pose of the robot in the room.
+    pub robot: Pose,
+    /// Time on a trajectory, s.
+    pub time_s: Option<f64>,
+}
+
+/// Names of a frame's files, relative to the set's folder; within the archive where there is one.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Names {
+    /// The picture.
+    pub image: String,
+    /// Range.
+    pub range: String,
+    /// Instances.
+    pub instance: String,
+    /// The frame's truth, where the layout has it frame by frame.
+    pub truth: Option<String>,
+}
+
+/// A pose as files have it.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct FramePose {
+    /// x in the room, m.
+    pub x_m: f64,
+    /// y, m.
+    pub y_m: f64,
+    /// Heading, rad, anti-clockwise from x.
+    pub heading_rad: f64,
+}
+
+impl From<Pose> for FramePose {
+    fn from(pose: Pose) -> Self {
+        Self { x_m: pose.x, y_m: pose.y, heading_rad: pose.heading }
+    }
+}
+
+impl From<FramePose> for Pose {
+    fn from(pose: FramePose) -> Self {
+        Self::new(pose.x_m, pose.y_m, pose.heading_rad)
+    }
+}
+
+/// What is true of a frame.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct FrameTruth {
+    /// Number in the whole set.
+    pub frame: usize,
+    /// Condition.
+    pub condition: String,
+    /// Number within the condition; the same pose has the same one in every condition.
+    pub spot: usize,
+    /// Row and column of the grid.
+    pub place: Option<[usize; 2]>,
+    /// Time on a trajectory, s.
+    pub t_s: Option<f64>,
+    /// Pose of the robot in the room.
+    pub pose: FramePose,
+    /// Where the camera is: x, y and height above the floor, m.
+    pub camera_m: [f64; 3],
+    /// The landmark bodies, in the world's order.
+    pub landmarks: Vec<LandmarkTruth>,
+}
+
+/// What is true of a landmark in a frame.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct LandmarkTruth {
+    /// Instance id.
+    pub instance: u16,
+    /// Name in the world.
+    pub name: String,
+    /// Azimuth of its centre from the robot's heading, rad, in (-pi, pi].
+    pub bearing_rad: f64,
+    /// Horizontal distance from the camera to its centre, m.
+    pub range_m: f64,
+    /// Whether any pixel shows it.
+    pub visible: bool,
+    /// Pixels that show it.
+    pub seen_px: u32,
+    /// Pixels that would show it if nothing else were in the room.
+    pub alone_px: u32,
+    /// Share of those that something hides, 0 to 1; none where it lies outside the picture.
+    pub occluded: Option<f64>,
+}
+
+/// Where the bytes of a picture are.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) enum Source {
+    /// In a file of their own.
+    File(PathBuf),
+    /// In an uncompressed archive.
+    Member {
+        /// The archive.
+        archive: PathBuf,
+        /// Name within.
+        name: String,
+        /// First byte.
+        offset: u64,
+        /// Length.
+        bytes: u64,
+    },
+}
+
+/// A panorama of a set on disk, with what is known of where it was taken.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Entry {
+    /// Condition: the name of its folder or shard; empty where the set has one condition without a name.
+    pub condition: String,
+    /// Name within the condition.
+    pub key: String,
+    /// Place of the grid.
+    pub place: Option<Place>,
+    /// Pose of the robot in the set's own frame (the room's, for a set that this program wrote), as far as the set tells.
+    pub pose: Option<Pose>,
+    /// Picture, range and instances.
+    pub(super) image: Source,
+    pub(super) range: Option<Source>,
+    pub(super) instance: Option<Source>,
+}
+
+impl Entry {
+    /// An entry of which no more is known than its files.
+    pub(super) fn new(condition: &str, key: impl Into<String>, image: Source) -> Self {
+        Self { condition: condition.to_owned(), key: key.into(), place: None, pose: None, image, range: None, instance: None }
+    }
+
+    /// Whether it has range and instances beside the picture.
+    #[must_use]
+    pub fn has_truth(&self) -> bool {
+        self.range.is_some() && self.instance.is_some()
+    }
+
+    /// The picture's file, or the archive that holds it.
+    #[must_use]
+    pub fn path(&self) -> &std::path::Path {
+        match &self.image {
+            Source::File(path) | Source::Member { archive: path, .. } => path,
+        }
+    }
+}

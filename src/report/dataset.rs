@@ -1,0 +1,232 @@
+//! What goes with a data set: its card; and the page on how fast sets are made.
+
+use std::fmt::Write;
+
+use super::sheet::Sheet;
+use crate::error::Result;
+use crate::panorama::Panorama;
+use crate::panorama_set::{Document, Layout};
+use crate::study::dataset::check::{FaultKind, Inspection};
+use crate::study::dataset::speed::Findings;
+
+/// Names of the files of the page on speed.
+pub const FILES: &[&str] = &["README.md", "speed.json"];
+
+/// The card of a set and its example pictures, by name.
+///
+/// # Errors
+/// When a picture cannot be encoded.
+pub fn card(document: &Document, home: &Panorama) -> Result<Vec<(String, Vec<u8>)>> {
+    let mut sheet = Sheet::new();
+    sheet.add(home);
+    Ok(vec![
+        ("README.md".into(), card_text(document).into_bytes()),
+        ("examples/home.png".into(), sheet.png("examples/home.png")?),
+    ])
+}
+
+fn card_text(d: &Document) -> String {
+    let mut text = format!(
+        "---\nlicense: {}\npretty_name: Panoramas of {}\ntags:\n- robotics\n- visual-homing\n- panorama\n- synthetic\nconfigs:\n",
+        d.licence.to_lowercase(),
+        d.world
+    );
+    for table in ["frames", "landmarks", "matches"] {
+        let _ = write!(text, "- config_name: {table}\n  data_files: truth/{table}-*.parquet\n");
+    }
+    if d.layout == Layout::Webdataset {
+        text += "- config_name: samples\n  data_files: shards/*.tar\n";
+    }
+    let p = d.projection;
+    let _ = write!(
+        text,
+        "---\n\n# Panoramas of `{}`\n\n{} panoramas of {} x {} pixels, rendered in a simulated room by wayhome {}. Licence: {}.\n\n\
+         ![Colours, range and instances at home](examples/home.png)\n\n*Home: colours, range from near (light) to far (dark), \
+         instances.*\n\n```sh\n{}\n```\n\nmakes the set again, byte by byte. SHA-256 of the world: `{}`. Seed: {}. Renderer: {}.\n\n\
+         ## Conditions\n\n| condition | what it is | frames | left out | home |\n|---|---|---|---|---|\n",
+        d.world, d.frames, p.width, p.height, d.version, d.licence, d.command, d.world_sha256, d.seed, d.renderer
+    );
+    for c in &d.conditions {
+        let _ = writeln!(
+            text,
+            "| `{}` | {} | {} | {} | ![{}](home/{}.rgb.png) |",
+            c.name, c.description, c.frames, c.left_out, c.name, c.name
+        );
+    }
+    text += "\nPoses at which the robot cannot stand are left out; `left-out.csv` names them and what is in the way.\n";
+    if let Some(g) = &d.grid {
+        let [x, y] = g.first_m;
+        let _ = write!(
+            text,
+            "\nThe grid has {} rows and {} columns, {} m apart: place (i, j) lies at ({x} + j {}, {y} - i {}) m in the room{}.\n",
+            g.rows,
+            g.columns,
+            g.spacing_m,
+            g.spacing_m,
+            g.spacing_m,
+            g.home.map_or_else(String::new, |[i, j]| format!("; home is place ({i}, {j})"))
+        );
+    }
+    let _ = write!(text, "\n## Files\n\nLayout: `{}`. {}\n", d.layout.name(), files(d.layout));
+    text += &projection(d);
+    text += TRUTH;
+    text
+}
+
+fn files(layout: Layout) -> &'static str {
+    match layout {
+        Layout::Vardy => {
+            "Pictures are `CONDITION/I_J.pgm`, 8-bit grey; range and instances of each are `truth/CONDITION/I_J.range.png` and \
+             `.instance.png`."
+        }
+        Layout::Moeller => {
+            "`DATA2/*.db` holds `w xmin xmax ymin ymax vertRes horizon`; pictures are `cv_X_Y_bwBW.pgm`, 8-bit grey, X = rows - 1 - i \
+             and Y = j; range and instances of each lie in `truth/CONDITION/`."
+        }
+        Layout::ImageDatabase => {
+            "Each condition's folder is an image database: `database_entries.csv` (mm and degrees), `database_metadata.yaml` and the \
+             pictures; range and instances of each lie in `truth/CONDITION/`."
+        }
+        Layout::Webdataset => {
+            "Samples are `KEY.rgb.png`, `KEY.range.png`, `KEY.instance.png` and `KEY.json` in `shards/*.tar`."
+        }
+        Layout::Folder | Layout::Paper => {
+            "A frame is `CONDITION/N.rgb.png`, `.range.png`, `.instance.png` and `.json`; the same N is the same pose in every condition."
+        }
+    }
+}
+
+fn projection(d: &Document) -> String {
+    let (p, clockwise) = (d.projection, d.layout.is_clockwise());
+    let column = if clockwise { "falls" } else { "grows" };
+    let rows = match p.kind {
+        crate::panorama::ProjectionKind::Cylindrical => "the tangent of elevation",
+        crate::panorama::ProjectionKind::EqualAngle => "elevation",
+    };
+    let mut text = format!(
+        "\nA panorama is a full turn. Column 0 looks {:.3} degrees to the left of the robot's heading, and azimuth, anti-clockwise, \
+         {column} by 2 pi / {} a column. Rows are even in {rows} by the same step; the horizon is {:.2} rows below the top edge. The \
+         camera is {} m above the floor. Range is in {}. Instance ids are those of `dataset.json`.\n",
+        p.mount_rad.to_degrees(),
+        p.width,
+        p.horizon_row,
+        d.camera_height_m,
+        d.range_unit
+    );
+    if clockwise {
+        let _ = writeln!(
+            text,
+            "Columns of the tables and pictures in `home/` are counted anti-clockwise: column c there is column ({} - c) mod {} of the \
+             files.",
+            p.width, p.width
+        );
+    }
+    text
+}
+
+const TRUTH: &str = "\n## Truth\n\n\
+| file | holds |\n|---|---|\n\
+| `truth/frames-*.parquet`, `.jsonl` | pose of robot and camera of each frame, place of the grid, time on a trajectory; in the JSON lines its \
+landmarks too |\n\
+| `truth/landmarks-*.parquet` | for each frame and landmark: bearing from the heading, horizontal range, whether it is visible, pixels that \
+show it, pixels that would if nothing else were in the room, share of them that is hidden |\n\
+| `truth/matches-*.parquet` | for each frame: features of the condition's home panorama, and where the same point of the surface is in the \
+frame; those that are hidden there are left out |\n\
+| `home/*.png` | the home panorama of each condition |\n\
+| `dataset.json` | all of the above about the set as a whole, for programs |\n\
+| `parts/*.json` | the parts in which the set was made, with length and SHA-256 of their files |\n\
+| `SHA256SUMS` | sums of all files: `sha256sum --check SHA256SUMS`, or `wayhome dataset check DIR` |\n\n\
+Lengths are metres, angles radians anti-clockwise. `frame` numbers frames through the whole set, `spot` within a condition: the same spot is \
+the same pose in every condition.\n";
+
+/// What a check found, for a terminal.
+#[must_use]
+pub fn inspection(found: &Inspection, folder: &std::path::Path) -> String {
+    let mut text = String::new();
+    for fault in &found.faults {
+        let kind = match fault.kind {
+            FaultKind::Missing => "missing",
+            FaultKind::Cut => "cut off",
+            FaultKind::Altered => "altered",
+            FaultKind::Extra => "extra",
+            FaultKind::Unfinished => "unfinished",
+        };
+        let _ = writeln!(text, "{kind:10} {}", fault.path);
+    }
+    let good = if found.faults.is_empty() { "OK".to_owned() } else { format!("{} faults", found.faults.len()) };
+    let _ = writeln!(text, "{}: {good}, {} files, {:.1} MB", folder.display(), found.files, found.bytes as f64 / 1e6);
+    text
+}
+
+/// The page on speed.
+#[must_use]
+pub fn speed_page(f: &Findings) -> String {
+    let mut text = format!(
+        "# Making data sets\n\nMade by `wayhome dataset bench --out results/dataset`. Processor: {}. World: `{}`.\n\n## The whole way to disk\n\n\
+         Colours, range and instances as PNG, truth, sums; CPU renderer; random poses; medians of rounds that take turns. Panoramas a \
+         second:\n\n\
+         | size | threads | rendering alone | encoding alone | the whole | of the slower alone | most that is possible | rendering, one \
+         thread | encoding, one thread | the whole of the slower of these |\n|---|---|---|---|---|---|---|---|---|---|\n",
+        f.processor, f.world
+    );
+    for r in &f.rates {
+        let _ = writeln!(
+            text,
+            "| {} x {} | {} | {:.0} | {:.0} | {:.0} | {:.0} % | {:.0} % | {:.0} | {:.0} | {:.0} % |",
+            r.width,
+            r.height,
+            r.threads,
+            r.render_per_s,
+            r.encode_per_s,
+            r.pipeline_per_s,
+            100.0 * r.share_of_slower(),
+            100.0 * r.bound_per_s() / r.render_per_s.min(r.encode_per_s),
+            r.render_one_per_s,
+            r.encode_one_per_s,
+            100.0 * r.share_of_slower_one()
+        );
+    }
+    text += "\nRendering and encoding both keep every processor busy, so that together they cannot be as fast as the slower of them with all \
+             processors to itself: \"most that is possible\" is the inverse of the sum of their times. The last column holds the whole against the \
+             slower of the two with one thread each, which is what a pipeline of one thread a stage comes to at best.\n\n## Codings\n\n";
+    let [width, height] = f.codings_px;
+    let _ = write!(
+        text,
+        "One thread, panoramas of {width} x {height}. Length is that of the file over that of the pixels. In use: fdeflate with Paeth's filter \
+         for colours and range, with the row above for instances.\n\n| channel | coding | ms | length |\n|---|---|---|---|\n"
+    );
+    for c in &f.codings {
+        let _ = writeln!(text, "| {} | {} | {:.2} | {:.3} |", c.channel, c.coding, c.ms, c.share);
+    }
+    text += "\nmtpng is not in the table: it spreads one picture over threads, which are all busy with a picture each here, and compresses by zlib's \
+             levels, whose fastest is.\n";
+    text
+}
+
+/// The rates, for a terminal.
+#[must_use]
+pub fn speed_text(f: &Findings) -> String {
+    let mut text = String::new();
+    for r in &f.rates {
+        let _ = writeln!(
+            text,
+            "{} x {}, {} threads: rendering {:.0}/s, encoding {:.0}/s, whole {:.0}/s: {:.0} % of the slower, of {:.0} % possible; \
+             {:.0} % of the slower on one thread each ({:.0}/s, {:.0}/s)",
+            r.width,
+            r.height,
+            r.threads,
+            r.render_per_s,
+            r.encode_per_s,
+            r.pipeline_per_s,
+            100.0 * r.share_of_slower(),
+            100.0 * r.bound_per_s() / r.render_per_s.min(r.encode_per_s),
+            100.0 * r.share_of_slower_one(),
+            r.render_one_per_s,
+            r.encode_one_per_s
+        );
+    }
+    for c in &f.codings {
+        let _ = writeln!(text, "{:8} {:20} {:7.2} ms {:.3}", c.channel, c.coding, c.ms, c.share);
+    }
+    text
+}
