@@ -131,7 +131,7 @@ impl<'a> Sums<'a> {
             Cell {
                 colour: 0.5 + 0.5 * pairs.difference(),
                 number: if pairs.difference() == 0.0 { "0".into() } else { points(pairs.difference()) },
-                interval: format!("{} to {}", points(low), points(high)),
+                interval: format!("{}\u{2026}{}", points(low), points(high)),
                 told: format!(
                     "of {} pairs both came home in {}, only {a} in {}, only {b} in {}, neither in {}",
                     pairs.trials(),
