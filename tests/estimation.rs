@@ -124,7 +124,7 @@ fn trial(setting: &Setting, seed: u64) -> Trial {
         robot: RobotSheet { track_m: 0.23, max_speed_m_s: speed, max_turn_rate_rad_s: 1.9, max_acceleration_m_s2: 0.9 },
         task: TaskSheet { speed_m_s: speed, control_period_s: period, arrival_radius_m: radius },
     };
-    let mut method = build(setting.method, setting.law, briefing, None).unwrap();
+    let mut method = build(setting.method, setting.law, FilterSettings::default(), briefing, None).unwrap();
     let filter_settings = FilterSettings { track_m: 0.23, ..FilterSettings::default() };
     let mut slip = SlipWatch::default();
     let mut odometry = Odometry::default();

@@ -39,8 +39,10 @@ const MEASURES: [Measure; 21] = [
     ("matched_mean", |s| Some(s.landmarks.matched_mean)),
     ("rejected_mean", |s| Some(s.landmarks.rejected_mean)),
 ];
+/// A whole number of a summary.
+type Count = fn(&Summary) -> usize;
 /// Whole numbers of a row.
-const COUNTS: [(&str, fn(&Summary) -> usize); 3] =
+const COUNTS: [(&str, Count); 3] =
     [("collisions", |s| s.collisions), ("home_landmarks", |s| s.landmarks.home), ("steps", |s| s.steps)];
 
 /// One episode.
