@@ -126,7 +126,7 @@ fn trial(setting: &Setting, seed: u64) -> Trial {
         compass: false,
         camera: None,
     };
-    let mut method = build(setting.method.clone(), setting.law, briefing, None).unwrap();
+    let mut method = build(setting.method.clone(), setting.law, FilterSettings::default(), briefing, None).unwrap();
     let filter_settings = FilterSettings { track_m: 0.23, ..FilterSettings::default() };
     let mut slip = SlipWatch::default();
     let mut odometry = Odometry::default();

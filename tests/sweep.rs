@@ -1,11 +1,12 @@
-//! Stress studies at the process boundary: resumed, sharded, merged, replayed.
+//! Stress studies at the process boundary: resumed, sharded, merged, replayed, run by HyperQueue, read in a browser.
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests are not recognised as tests")]
 
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
+use wayhome::study::sweep::Study;
 use wayhome::table::{Cells, Table};
 
 /// A study that takes a second: no camera, one cell that fails, one in which no run can start.
@@ -177,4 +178,136 @@ fn faults_of_a_study_are_told_before_anything_runs() {
     fs::write(at.join("precious/thesis.tex"), "mine").unwrap();
     refused(&wayhome(at, &["sweep", "quick.toml", "--out", "precious"]).output().unwrap(), 1, &["thesis.tex"]);
     assert_eq!(fs::read_dir(at.join("precious")).unwrap().count(), 1, "nothing is left behind");
+}
+
+#[test]
+fn built_in_studies_can_be_run() {
+    for (name, cells, episodes) in
+        [("slip-occlusion", 144, 4320), ("wet-hall", 48, 960), ("light-camera", 50, 1000), ("faults-sobol", 768, 3072)]
+    {
+        let study = Study::open(name, None).unwrap_or_else(|error| panic!("{name}: {error}"));
+        assert_eq!((study.cells(), study.episodes()), (cells, episodes), "{name}");
+        let covered: u64 = (0..study.chunks()).map(|k| study.chunk(k).count).sum();
+        assert_eq!(covered, episodes, "{name}: every episode is in a chunk");
+        // Between listed levels everything was checked by opening it; of sampled points some are.
+        for cell in (0..cells).step_by(7) {
+            study.case(&study.values(cell)).unwrap_or_else(|error| panic!("{name}, cell {cell}: {error}"));
+        }
+    }
+    assert_eq!(Study::builtin_names().len(), 4, "the list above has all of them");
+}
+
+/// The interpreter with the packages of `tests/outside/requirements.txt`, where `.ci/run` or a person has made one.
+fn python() -> Option<PathBuf> {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("target/python-venv/bin/python");
+    if path.exists() {
+        return Some(path);
+    }
+    stand_aside(&format!(
+        "{} is missing; it takes the packages of tests/outside/requirements.txt, and .ci/run makes it",
+        path.display()
+    ));
+    None
+}
+
+fn stand_aside(why: &str) {
+    assert!(std::env::var_os("WAYHOME_REQUIRE_PYTHON").is_none(), "{why}");
+    eprintln!("NOT RUN: {why}");
+}
+
+fn outside(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/outside").join(name)
+}
+
+/// A study of some seconds, so that a worker can be lost in the middle of a shard.
+const LONGER: &str = r#"
+name = "longer"
+world = "lab"
+seeds = "1..60"
+[settings]
+bearings = "noisy"
+world.task.time_limit_s = 30
+[[axes]]
+setting = "hidden_share"
+values = [0.0, 0.5, 0.9]
+[[axes]]
+setting = "method"
+values = ["anchored-ekf", "alv"]
+"#;
+
+#[test]
+fn hyperqueue_loses_a_worker_and_gets_the_same_rows() {
+    let Some(python) = python() else { return };
+    let base = tempfile::tempdir().unwrap();
+    let at = base.path();
+    fs::write(at.join("longer.toml"), LONGER).unwrap();
+    done(wayhome(at, &["sweep", "longer.toml", "--out", "one"]));
+
+    let mut script = Command::new(python);
+    let study = at.join("longer.toml");
+    script.arg(outside("hyperqueue_sweep.py")).arg(env!("CARGO_BIN_EXE_wayhome")).arg(study).arg("6").arg(at.join("queue"));
+    let output = done(script);
+    let told = String::from_utf8(output.stdout).unwrap();
+    let told: serde_json::Value = serde_json::from_str(told.lines().last().unwrap()).unwrap();
+    let attempts = told["attempts"].as_array().unwrap();
+    let of = |shard: u64| attempts.iter().filter(move |attempt| attempt["shard"] == shard);
+    assert!((1..=6).all(|shard| of(shard).count() > 0), "{told}");
+    let again = attempts.iter().find(|attempt| attempt["instance"] == 1).expect("a shard that was started again");
+    let shard = again["shard"].as_u64().unwrap();
+    let workers: Vec<_> = of(shard).map(|attempt| attempt["worker"].as_str().unwrap()).collect();
+    assert_eq!(workers, ["worker-1", "worker-2"], "lost with the one, done by the other: {told}");
+    let rows = |folder: &str| fs::read(at.join(folder).join("rows.parquet")).unwrap();
+    assert!(rows("queue/merged") == rows("one"), "the rows of one machine, to the byte");
+}
+
+/// Short runs through a small camera, of which many fail; names that must be written as HTML has them.
+const SEEN: &str = r#"
+name = "seen"
+description = "All that a page can show: <two> axes & two methods, seen through a camera."
+world = "crowd"
+seeds = "1..2"
+[settings]
+bearings = "rendered"
+size = "240x30"
+renderer = "cpu"
+extractor.features = 100
+extractor.home_features = 100
+time_limit_s = 8
+world.task.arrival_radius_m = 0.3
+world.start.max_distance_m = 1.2
+[[axes]]
+setting = "floor_friction"
+label = "floor friction"
+values = [0.8, 0.02]
+[[axes]]
+setting = "hidden_share"
+label = "landmarks hidden"
+values = [0.0, 0.5, 0.8, 0.9, 0.95, 0.98]
+[[axes]]
+setting = "method"
+values = ["anchored-ekf", "alv"]
+"#;
+
+#[test]
+fn the_page_is_drawn_in_a_browser() {
+    let Some(python) = python() else { return };
+    let base = tempfile::tempdir().unwrap();
+    let at = base.path();
+    fs::write(at.join("seen.toml"), SEEN).unwrap();
+    done(wayhome(at, &["sweep", "seen.toml", "--out", "rows"]));
+    done(wayhome(at, &["sweep", "report", "rows"]));
+    let mut script = Command::new(python);
+    let output = script.arg(outside("report_page.py")).arg(at.join("rows/report/index.html")).output().unwrap();
+    if output.status.code() == Some(77) {
+        return stand_aside(&String::from_utf8_lossy(&output.stderr));
+    }
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let told: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    for width in ["390", "1280"] {
+        let page = &told[width];
+        assert_eq!(page["faults"], serde_json::json!([]), "at {width} px");
+        // A map of success a method, of their difference one, and two curves an axis.
+        assert_eq!(page["figures"].as_array().unwrap().len(), 2 + 1 + 2 * 2, "at {width} px: {page}");
+        assert_eq!(page["pictures"], 24, "at {width} px: path and panorama of twelve failures");
+    }
 }

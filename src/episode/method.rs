@@ -123,7 +123,8 @@ pub enum LawKind {
     Lyapunov,
 }
 
-/// Builds a method. `filter` is for `anchored-ekf`; `initial` is the pose in the home frame that `paper-ekf` is started from; others must not get one.
+/// Builds a method. `filter` is for `anchored-ekf`; `initial` is the pose in the home frame that `paper-ekf` is started from;
+/// others must not get one.
 ///
 /// # Errors
 /// When the method needs more of the home snapshot than there is, or `initial` is given to a method that takes none.

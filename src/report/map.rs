@@ -73,6 +73,7 @@ pub struct MapDrawing {
     markers: Group,
     labels: Labels,
     legend: Legend,
+    has_legend: bool,
     robot_radius_m: f64,
 }
 
@@ -91,6 +92,7 @@ impl MapDrawing {
             markers: Group::new(),
             labels: Labels::default(),
             legend: Legend::default(),
+            has_legend: true,
             robot_radius_m: world.spec.robot.radius_m,
         };
         drawing.draw_world(world);
@@ -101,6 +103,13 @@ impl MapDrawing {
     #[must_use]
     pub fn title(mut self, title: impl Into<String>) -> Self {
         self.title = Some(title.into());
+        self
+    }
+
+    /// Leaves out the legend, for a small drawing beside words that explain it.
+    #[must_use]
+    pub fn without_legend(mut self) -> Self {
+        self.has_legend = false;
         self
     }
 
@@ -166,7 +175,9 @@ impl MapDrawing {
     #[must_use]
     pub fn to_svg(&self) -> String {
         let top = if self.title.is_some() { 44.0 } else { 16.0 };
-        let legend = self.legend.draw(top + self.frame.height_px() + frame::AXIS_PX, WIDTH_PX);
+        let unexplained = Legend::default();
+        let legend = if self.has_legend { &self.legend } else { &unexplained };
+        let legend = legend.draw(top + self.frame.height_px() + frame::AXIS_PX, WIDTH_PX);
         let map = Group::new()
             .set("transform", format!("translate(0 {top})"))
             .add(self.floor.clone())

@@ -11,8 +11,13 @@ const ELLIPSES: usize = 12;
 /// Standard deviations that an ellipse covers.
 const K_SIGMA: f64 = 2.0;
 
-/// Draws the true path, the estimated one with its ellipses, and the one that the odometry alone would tell.
+/// Draws the path of a run, with a title and a legend.
 pub(super) fn path_svg(world: &World, record: &Record) -> String {
+    path_drawing(world, record).title(title(world, record)).to_svg()
+}
+
+/// Draws the true path, the estimated one with its ellipses, and the one that the odometry alone would tell.
+pub(super) fn path_drawing(world: &World, record: &Record) -> MapDrawing {
     let believed: Vec<(Pose, &Estimate)> = record
         .steps
         .iter()
@@ -20,7 +25,6 @@ pub(super) fn path_svg(world: &World, record: &Record) -> String {
         .map(|estimate| (record.home.compose(&estimate.pose), estimate))
         .collect();
     let mut drawing = MapDrawing::new(world)
-        .title(title(world, record))
         .path(positions(&record.steps, |s| s.dead_reckoned), &PathStyle::ODOMETRY, "path by odometry alone")
         .path(positions(&record.steps, |s| s.truth), &PathStyle::TRUTH, "true path")
         .start(&record.first().truth)
@@ -31,7 +35,7 @@ pub(super) fn path_svg(world: &World, record: &Record) -> String {
     for (pose, estimate) in believed.iter().step_by(believed.len().div_ceil(ELLIPSES).max(1)) {
         drawing = drawing.ellipse(pose, in_room(&record.home, estimate), K_SIGMA);
     }
-    drawing.to_svg()
+    drawing
 }
 
 fn title(world: &World, record: &Record) -> String {

@@ -13,6 +13,9 @@ pub(super) struct Figure {
     pub svg: String,
 }
 
+/// What stands in a heat map at some levels.
+type CellAt<'a> = dyn Fn(&[(&Scale, usize)]) -> Option<Cell> + 'a;
+
 /// Parts of the page that have figures.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Section {
@@ -70,7 +73,7 @@ impl<'a> Sums<'a> {
         let mut figures = Vec::new();
         let names = self.names();
         if let Some((x, y)) = self.plane() {
-            let grid = |cell: &dyn Fn(&[(&Scale, usize)]) -> Option<Cell>| -> Vec<Vec<Option<Cell>>> {
+            let grid = |cell: &CellAt| -> Vec<Vec<Option<Cell>>> {
                 let rows = y.map_or(1, |y| y.levels.len());
                 let place = |row: usize, column: usize| {
                     let mut place = vec![(x, column)];
@@ -131,7 +134,7 @@ impl<'a> Sums<'a> {
             Cell {
                 colour: 0.5 + 0.5 * pairs.difference(),
                 number: if pairs.difference() == 0.0 { "0".into() } else { points(pairs.difference()) },
-                interval: format!("{} to {}", points(low), points(high)),
+                interval: format!("{}\u{2026}{}", points(low), points(high)),
                 told: format!(
                     "of {} pairs both came home in {}, only {a} in {}, only {b} in {}, neither in {}",
                     pairs.trials(),

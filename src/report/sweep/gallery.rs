@@ -7,7 +7,7 @@ use image::{DynamicImage, ImageBuffer, Rgb};
 use super::StudyFolder;
 use crate::error::Result;
 use crate::panorama::Panorama;
-use crate::report::path_plot::path_svg;
+use crate::report::path_plot::path_drawing;
 use crate::study::sweep::{Row, replay};
 
 /// Width of a panorama in the page, px.
@@ -33,7 +33,7 @@ pub(super) fn exhibit(folder: &StudyFolder, row: &Row) -> Result<Option<Exhibit>
         return Ok(None);
     }
     let panorama = record.pictures.end.as_ref().and_then(jpeg);
-    Ok(Some(Exhibit { row: again, path: path_svg(&world, &record), panorama }))
+    Ok(Some(Exhibit { row: again, path: path_drawing(&world, &record).without_legend().to_svg(), panorama }))
 }
 
 fn jpeg(panorama: &Panorama) -> Option<Vec<u8>> {

@@ -8,8 +8,8 @@ use crate::study::sweep::tally::Scale;
 
 /// Width of a figure, px: that of a phone, where it is shown as it is; on a desk several stand side by side.
 pub(super) const WIDTH_PX: f64 = 360.0;
-/// Widest cell in which the interval is left out, px.
-const NARROW_PX: f64 = 38.0;
+/// Sizes of the font that intervals are written in, px: the usual one, and the least, below which they are left out.
+const INTERVAL_PX: [f64; 2] = [9.0, 7.0];
 /// Height of a row, px.
 const ROW_PX: f64 = 36.0;
 /// About how wide a letter is, as a share of the font's size.
@@ -40,6 +40,8 @@ pub(super) fn heat(title: &str, x: &Scale, y: Option<&Scale>, cells: &[Vec<Optio
     let slanted = 12.0 * LETTER * letters(x) > column - 4.0;
     let labels = if slanted { (11.0 * LETTER * letters(x) * 0.75).min(90.0) + 10.0 } else { 18.0 };
     let height = bottom + labels + 22.0 + 34.0;
+    let longest = cells.iter().flatten().flatten().map(|cell| cell.interval.chars().count()).max().unwrap_or(0);
+    let interval_px = ((column - 5.0) / (LETTER * longest.max(1) as f64)).min(INTERVAL_PX[0]);
     let mut page = document(height).add(text(title, 4.0, 18.0, 14.0).set("font-weight", "bold").set("fill", INK));
     for (row, cells) in cells.iter().enumerate() {
         let at = top + ROW_PX * row as f64;
@@ -49,7 +51,7 @@ pub(super) fn heat(title: &str, x: &Scale, y: Option<&Scale>, cells: &[Vec<Optio
         }
         for (k, cell) in cells.iter().enumerate() {
             let from = left + column * k as f64;
-            page = page.add(draw(cell.as_ref(), [from, at, from + column, at + ROW_PX]));
+            page = page.add(draw(cell.as_ref(), [from, at, from + column, at + ROW_PX], interval_px));
         }
     }
     for (k, level) in x.levels.iter().enumerate() {
@@ -80,7 +82,7 @@ pub(super) fn document(height: f64) -> Document {
         .add(rectangle([0.0, 0.0, WIDTH_PX, height]).set("fill", "#ffffff"))
 }
 
-fn draw(cell: Option<&Cell>, [left, top, right, bottom]: [f64; 4]) -> Group {
+fn draw(cell: Option<&Cell>, [left, top, right, bottom]: [f64; 4], interval_px: f64) -> Group {
     let inset = [left + 1.0, top + 1.0, right - 1.0, bottom - 1.0];
     let Some(cell) = cell else {
         let cross = line([inset[0], inset[1]], [inset[2], inset[3]]).set("stroke", "#d8d6d0");
@@ -88,7 +90,7 @@ fn draw(cell: Option<&Cell>, [left, top, right, bottom]: [f64; 4]) -> Group {
     };
     let (colour, ink) = colour(cell.colour);
     let (middle, centre) = (0.5 * (left + right), 0.5 * (top + bottom));
-    let wide = right - left > NARROW_PX && !cell.interval.is_empty();
+    let wide = interval_px >= INTERVAL_PX[1] && !cell.interval.is_empty();
     let number = text(&cell.number, middle, if wide { centre } else { centre + 4.0 }, 12.5).set("text-anchor", "middle");
     let mut field = rectangle(inset).set("fill", colour).set("rx", 2);
     if cell.framed {
@@ -97,7 +99,8 @@ fn draw(cell: Option<&Cell>, [left, top, right, bottom]: [f64; 4]) -> Group {
     let mut group =
         Group::new().add(Title::new(cell.told.clone())).add(field).add(number.set("fill", ink).set("font-weight", "bold"));
     if wide {
-        group = group.add(text(&cell.interval, middle, centre + 12.0, 9.0).set("text-anchor", "middle").set("fill", ink));
+        let interval = text(&cell.interval, middle, centre + 12.0, interval_px).set("text-anchor", "middle");
+        group = group.add(interval.set("fill", ink));
     }
     group
 }

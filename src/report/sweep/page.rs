@@ -18,6 +18,7 @@ h2{font-size:1.25rem;margin:2em 0 .3em}
 p{max-width:46em;margin:.4em 0 1em}
 .faint{color:#5c5a55}
 .figures{display:grid;grid-template-columns:repeat(auto-fill,minmax(min(100%,330px),1fr));gap:14px;margin:14px 0}
+.pairwise{max-width:960px;grid-template-columns:repeat(auto-fill,minmax(min(100%,440px),1fr))}
 figure{margin:0;background:#fff;border:1px solid #e2e0da;border-radius:8px;padding:8px;min-width:0}
 figure svg,figure img{display:block;width:100%;height:auto}
 figure img+img{margin-top:6px}
@@ -29,9 +30,9 @@ figcaption{font-size:.85rem;padding:6px 4px 2px;overflow-wrap:anywhere}
 .scroll{overflow-x:auto;background:#fff;border:1px solid #e2e0da;border-radius:8px;margin:14px 0}
 table{border-collapse:collapse;width:100%;font-size:.88rem;font-variant-numeric:tabular-nums}
 th,td{padding:6px 10px;text-align:right;white-space:nowrap;border-bottom:1px solid #eceae5}
-th{background:#faf9f7;font-weight:600}
+th{background:#faf9f7;font-weight:600;white-space:normal;vertical-align:bottom;line-height:1.25}
 th:first-child,td:first-child,.words td,.words th{text-align:left}
-.words td{white-space:normal;overflow-wrap:anywhere}
+.words td+td{white-space:normal;overflow-wrap:anywhere}
 tr:last-child td{border-bottom:0}
 pre{margin:0;padding:12px;font-size:.82rem;line-height:1.45}
 code{font-family:ui-monospace,SFMono-Regular,Menlo,Consolas,monospace;font-size:.92em}
@@ -138,8 +139,11 @@ impl Page<'_> {
     }
 
     fn section(&self, text: &mut String, section: Section, title: &str, words: &str) {
-        let _ = write!(text, "<h2>{title}</h2>\n<p>{words}</p>\n<div class=\"figures\">\n");
-        for figure in self.figures.iter().filter(|figure| figure.section == section) {
+        let figures: Vec<&Figure> = self.figures.iter().filter(|figure| figure.section == section).collect();
+        // Three stand side by side, but two and two look better than three and one.
+        let class = if figures.len() == 4 { "figures pairwise" } else { "figures" };
+        let _ = write!(text, "<h2>{title}</h2>\n<p>{words}</p>\n<div class=\"{class}\">\n");
+        for figure in figures {
             let _ = writeln!(text, "<figure data-name=\"{}\">{}</figure>", escaped(&figure.name), figure.svg.trim_end());
         }
         *text += "</div>\n";
@@ -198,7 +202,9 @@ impl Page<'_> {
             return;
         }
         *text += "<h2>Failures</h2>\n<p>Of each way to fail the runs that failed where most others came home, with the path and the \
-                  last panorama. The number is the row; the command runs it again exactly.</p>\n<div class=\"figures\">\n";
+                  last panorama. Black is the true path from the start, dotted green what odometry alone would have told, dashed orange the \
+                  estimate with 2-sigma ellipses where a method makes one, red home, blue the end. The command runs a row again \
+                  exactly.</p>\n<div class=\"figures\">\n";
         for Exhibit { row, path, panorama } in self.exhibits {
             let _ = write!(
                 text,

@@ -39,10 +39,10 @@ const MEASURES: [Measure; 21] = [
     ("matched_mean", |s| Some(s.landmarks.matched_mean)),
     ("rejected_mean", |s| Some(s.landmarks.rejected_mean)),
 ];
-/// A whole number that a summary has.
-type CountOf = fn(&Summary) -> usize;
+/// A whole number of a summary.
+type Count = fn(&Summary) -> usize;
 /// Whole numbers of a row.
-const COUNTS: [(&str, CountOf); 3] =
+const COUNTS: [(&str, Count); 3] =
     [("collisions", |s| s.collisions), ("home_landmarks", |s| s.landmarks.home), ("steps", |s| s.steps)];
 
 /// One episode.

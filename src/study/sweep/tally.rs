@@ -171,7 +171,9 @@ pub fn duels(study: &Study, rows: &[Row]) -> Vec<Duel> {
 impl Duel {
     fn new(levels: [usize; 2], pairs: &BTreeMap<(u64, u64), Vec<Option<&Row>>>) -> Self {
         let mut all = Paired::default();
-        let (mut successes, mut ratios): (BTreeMap<u64, (f64, usize)>, BTreeMap<u64, (f64, usize)>) = Default::default();
+        // Of each seed the sum of the differences, and how many there are.
+        type Clusters = BTreeMap<u64, (f64, usize)>;
+        let (mut successes, mut ratios) = (Clusters::new(), Clusters::new());
         let mut kept = Vec::new();
         for (&(cell, seed), rows) in pairs {
             let (Some(a), Some(b)) = (rows[levels[0]], rows[levels[1]]) else { continue };
@@ -184,8 +186,7 @@ impl Duel {
                 *ratio = (ratio.0 + x - y, ratio.1 + 1);
             }
         }
-        let bootstrap =
-            |clusters: BTreeMap<u64, (f64, usize)>| cluster_bootstrap_95(&clusters.into_values().collect::<Vec<_>>());
+        let bootstrap = |clusters: Clusters| cluster_bootstrap_95(&clusters.into_values().collect::<Vec<_>>());
         Self { levels, all, success: bootstrap(successes), time_ratio: bootstrap(ratios), pairs: kept }
     }
 
