@@ -1,4 +1,4 @@
-"""Runs a stress study as tasks of PyPI's `hyperqueue`: a server and two workers, one of which is killed on the way, for tests/sweep.rs.
+"""Runs a stress study as tasks of PyPI's `hyperqueue`, on a server with two workers of which one is killed; for tests/sweep.rs.
 
 usage: hyperqueue_sweep.py WAYHOME STUDY.toml SHARDS FOLDER
 

@@ -1,7 +1,7 @@
 //! Stress studies: Monte-Carlo sweeps over any settings, in pieces that can be run anywhere and put together again.
 //!
-//! A [`Study`] is read from a file and checked as a whole ([`spec`]): settings that all episodes share, axes whose levels make
-//! cells ([`design`]), and seeds, the same ones in every cell. Its episodes are numbered; what an episode does follows from its
+//! A [`Study`] is read from a file and checked as a whole: settings that all episodes share, axes whose levels make
+//! cells ([`Design`]), and seeds, the same ones in every cell. Its episodes are numbered; what an episode does follows from its
 //! number alone. [`run()`] takes chunks of them, in parallel and in any order, and hands out [`Row`]s; [`merge`] puts the rows of
 //! all chunks into one table, whose bytes depend on the study alone. [`tally`] counts what the rows say.
 
