@@ -69,9 +69,6 @@ pub struct FilterSettings {
     pub patience_steps: u32,
     /// Steps that the smoother looks back on at most; later on the filter runs alone.
     pub history_steps: usize,
-    /// What a solution's covariance is multiplied by. Linearised where the estimate lies and not at the truth, it is too small: over
-    /// six paths in `lab`, 200 runs each, the mean NEES was 3.3 without this (`wayhome bound lab`).
-    pub linearisation_excess: f64,
 }
 
 impl Default for FilterSettings {
@@ -95,7 +92,6 @@ impl Default for FilterSettings {
             adopt_margin: 5.0,
             patience_steps: 8,
             history_steps: 200,
-            linearisation_excess: 1.1,
         }
     }
 }
@@ -427,8 +423,7 @@ impl AnchoredFilter {
         let supposed = best.pose.to_local(&self.map.pose()).position();
         let Some((ids, solution, motions)) = self.smooth(ids, start) else { return };
         let sharp = |e: &Estimate| e.position_sd_m() <= self.sharp_sd(e.range_m());
-        let candidate =
-            Map::from_solution(&ids, solution.mean.clone(), &solution.covariance * self.settings.linearisation_excess);
+        let candidate = Map::from_solution(&ids, solution.mean.clone(), solution.covariance.clone());
         let estimate = candidate.estimate();
         if ids.len() < 3 || !sharp(&estimate) || (estimate.pose.position() - supposed).norm() > 4.0 * sharp_sd {
             return;
@@ -464,7 +459,7 @@ impl AnchoredFilter {
             && kept.len() >= 3
             && 2 * kept.len() > held
         {
-            self.map.replace(&kept, solution.mean.clone(), &solution.covariance * self.settings.linearisation_excess);
+            self.map.replace(&kept, solution.mean.clone(), solution.covariance.clone());
             self.keep(&solution, motions);
         }
     }
