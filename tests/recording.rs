@@ -89,9 +89,13 @@ fn ctrl_c_leaves_no_half_recording() {
     ]
     .concat();
     let mut child = wayhome(folder.path(), &arguments).stderr(std::process::Stdio::null()).spawn().unwrap();
-    let partial = folder.path().join("run.gif.wayhome-partial");
+    let is_partial = |name: &std::ffi::OsStr| name.to_string_lossy().starts_with("run.gif.");
+    let recorded = || {
+        let files = fs::read_dir(folder.path()).unwrap().map(|file| file.unwrap());
+        files.filter(|file| is_partial(&file.file_name())).map(|file| file.metadata().map_or(0, |m| m.len())).sum::<u64>()
+    };
     let deadline = Instant::now() + Duration::from_secs(20);
-    while fs::metadata(&partial).map_or(0, |file| file.len()) == 0 {
+    while recorded() == 0 {
         assert!(Instant::now() < deadline, "nothing is recorded");
         std::thread::sleep(Duration::from_millis(10));
     }
