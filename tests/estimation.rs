@@ -4,6 +4,7 @@
 #![allow(clippy::print_stdout, clippy::unwrap_used, reason = "a failing test shows its table, and fails by panicking")]
 
 use num_dual::{Dual64, DualNum};
+use rayon::prelude::*;
 use wayhome::episode::method::{LawKind, MethodKind, build};
 use wayhome::estimation::anchored::map::predict_bearing;
 use wayhome::estimation::anchored::motion::SlipWatch;
@@ -193,7 +194,7 @@ struct Summary {
 }
 
 fn run(name: &str, setting: &Setting, seeds: u64) -> Summary {
-    let trials: Vec<_> = (1..=seeds).map(|s| trial(setting, s)).collect();
+    let trials: Vec<_> = (1..=seeds).into_par_iter().map(|s| trial(setting, s)).collect();
     let last: Vec<f64> = trials.iter().filter_map(|t| t.nees.last().copied()).collect();
     let summary = Summary {
         home: trials.iter().filter(|t| t.arrived && t.final_distance_m <= 0.05).count(),
@@ -231,18 +232,19 @@ fn base(count: usize, bearing_sd_deg: f64) -> Setting {
 #[test]
 fn home_from_nothing_known() {
     let cases = [
-        ("8 landmarks, 0.3 deg", base(8, 0.3), 39),
-        ("8 landmarks, 1 deg", base(8, 1.0), 34),
-        ("5 landmarks, 0.3 deg", base(5, 0.3), 38),
-        ("30 landmarks, 0.3 deg, 10 % false", Setting { false_share: 0.1, ..base(30, 0.3) }, 39),
-        ("30 landmarks, 0.3 deg, 30 % false", Setting { false_share: 0.3, ..base(30, 0.3) }, 38),
-        ("30 landmarks, 0.3 deg, Lyapunov", Setting { law: LawKind::Lyapunov, ..base(30, 0.3) }, 39),
+        ("8 landmarks, 0.3 deg", base(8, 0.3), 40, 39),
+        ("8 landmarks, 1 deg", base(8, 1.0), 40, 34),
+        ("5 landmarks, 0.3 deg", base(5, 0.3), 40, 38),
+        ("30 landmarks, 0.3 deg, 10 % false", Setting { false_share: 0.1, ..base(30, 0.3) }, 40, 39),
+        // One run in a hundred claimed home wrongly when bearings were gated one by one only.
+        ("30 landmarks, 0.3 deg, 30 % false", Setting { false_share: 0.3, ..base(30, 0.3) }, 400, 396),
+        ("30 landmarks, 0.3 deg, Lyapunov", Setting { law: LawKind::Lyapunov, ..base(30, 0.3) }, 40, 39),
     ];
-    for (name, setting, least) in cases {
-        let summary = run(name, &setting, 40);
-        assert!(summary.home >= least, "{name}: {} of 40", summary.home);
+    for (name, setting, seeds, least) in cases {
+        let summary = run(name, &setting, seeds);
+        assert!(summary.home >= least, "{name}: {} of {seeds}", summary.home);
         assert_eq!(summary.wrong_claims, 0, "{name}");
-        assert!(summary.median_ratio < 1.2, "{name}: {}", summary.median_ratio);
+        assert!(summary.median_ratio < 1.15, "{name}: {}", summary.median_ratio);
     }
 }
 

@@ -62,8 +62,8 @@ impl Controller {
         omega.clamp(-self.robot.max_turn_rate_rad_s, self.robot.max_turn_rate_rad_s)
     }
 
-    /// Twist that drives a robot at `pose` (home frame) home: cruising speed, less while it points elsewhere, and no more than
-    /// still lets it stop at home.
+    /// Twist that drives a robot at `pose` (home frame) home: cruising speed, less while it points far elsewhere, and no more than
+    /// still lets it stop at home. It slows down late: an arc that begins at once beats a turn on the spot.
     #[must_use]
     pub fn drive(&self, pose: &Pose) -> Twist {
         let range = pose.position().norm();
@@ -76,7 +76,7 @@ impl Controller {
         let facing = libm::cos(error.clamp(-std::f64::consts::FRAC_PI_2, std::f64::consts::FRAC_PI_2));
         // The relay turns only while it moves: it needs a little speed even when it faces away.
         let least = if self.law == Law::Lyapunov { 0.1 } else { 0.0 };
-        let v = cruise.min(braking) * facing.max(least);
+        let v = cruise.min(braking) * facing.sqrt().sqrt().max(least);
         Twist { v, omega: self.steer(pose, v) }
     }
 

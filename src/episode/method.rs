@@ -169,8 +169,12 @@ pub fn build(
 
 /// Home counts as reached within this share of the arrival radius, by the estimate.
 const STOP_SHARE: f64 = 0.25;
+/// ... or so near that braking at once ends there, within this share of the arrival radius ...
+const ROLL_SHARE: f64 = 0.5;
 /// ... if the position's standard deviation is within this share of the arrival radius.
 const STOP_SD_SHARE: f64 = 0.4;
+/// ... and the bearings of this many steps in a row bear it out.
+const STEADY_STEPS: u32 = 3;
 /// Creeping speed while the estimate is home but not yet sure, m/s.
 const CREEP_M_S: f64 = 0.06;
 /// A filter that is home for this long without becoming sure starts again, s.
@@ -208,12 +212,12 @@ impl AnchoredHoming {
         let range = estimate.range_m();
         // Braking from the speed last commanded takes this far; it may begin before home is reached.
         let rolling = self.speed_m_s * self.speed_m_s / (2.0 * self.max_acceleration_m_s2);
-        let near = range <= (STOP_SHARE * self.arrival_radius_m).max(rolling.min(0.5 * self.arrival_radius_m));
+        let near = range <= (STOP_SHARE * self.arrival_radius_m).max(rolling.min(ROLL_SHARE * self.arrival_radius_m));
         let passing = range <= 0.8 * self.arrival_radius_m && estimate.home_direction_rad().abs() > 1.4;
         if !(near || passing) {
             return (self.controller.drive(&estimate.pose), false);
         }
-        if estimate.position_sd_m() <= STOP_SD_SHARE * self.arrival_radius_m {
+        if estimate.position_sd_m() <= STOP_SD_SHARE * self.arrival_radius_m && self.filter.steady_steps() >= STEADY_STEPS {
             return (Twist::default(), true);
         }
         // At home by the mean but not sure of it: a slow circle brings parallax.

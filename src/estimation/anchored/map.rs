@@ -13,7 +13,7 @@ use nalgebra::{DMatrix, DVector, Matrix2, Matrix3, Vector3};
 
 use super::FilterSettings;
 use super::motion::Motion;
-use crate::estimation::gaussian::{Gaussian, Linearised, SparseRow};
+use crate::estimation::gaussian::{Gaussian, Linearised, Refused, SparseRow};
 use crate::estimation::resection;
 use crate::geometry::{Pose, atan2, direction, sin_cos, wrap};
 use crate::observation::{Bearing, Estimate, LandmarkId};
@@ -261,17 +261,36 @@ impl Map {
         }
         let held = members.clone();
         members.retain(|(k, bearing)| self.fits(*k, bearing, settings.gate));
+        let linearised = |x: &DVector<f64>, members: &[(usize, Bearing)]| -> Vec<Linearised> {
+            members.iter().map(|(k, b)| linearise(x, *k, b)).collect()
+        };
         if loosened && !members.is_empty() {
-            let prior = self.belief.clone();
-            self.belief.update_iterated(iterations, |x| members.iter().map(|(k, b)| linearise(x, *k, b)).collect());
-            members.retain(|(k, bearing)| self.fits(*k, bearing, settings.gate));
-            self.belief = prior;
+            let mut updated = self.clone();
+            let fine = updated.belief.update_iterated(iterations, |_| f64::INFINITY, |x| linearised(x, &members)).is_ok();
+            members.retain(|(k, bearing)| fine && updated.fits(*k, bearing, settings.gate));
         }
-        let refused = held.len() - members.len() + update.banned;
-        if settled && refused >= LEAST_CONTRADICTION && refused > 2 * members.len() {
-            update.contradicted = true;
-            update.rejected += held.len();
-            return update;
+        // While ranges are unknown the linearisation at the prior mean is too poor for a verdict on all bearings together.
+        let joint_gate = |count: usize| match settled {
+            true => settings.gate + settings.joint_gate * (count - 1) as f64,
+            false => f64::INFINITY,
+        };
+        loop {
+            let refused = held.len() - members.len() + update.banned;
+            if settled && refused >= LEAST_CONTRADICTION && refused > 2 * members.len() {
+                update.contradicted = true;
+                update.rejected += held.len();
+                return update;
+            }
+            match self.belief.update_iterated(iterations, joint_gate, |x| linearised(x, &members)) {
+                Ok(nis) => {
+                    update.nis = nis;
+                    break;
+                }
+                Err(Refused::Jointly { worst }) => {
+                    members.remove(worst);
+                }
+                Err(Refused::Singular) => members.clear(),
+            }
         }
         let mut used = members.iter().peekable();
         for (k, bearing) in held {
@@ -284,10 +303,6 @@ impl Map {
                 update.rejected += 1;
                 landmark.strikes += 1;
             }
-        }
-        match self.belief.update_iterated(iterations, |x| members.iter().map(|(k, b)| linearise(x, *k, b)).collect()) {
-            Some(nis) => update.nis = nis,
-            None => update.used.clear(),
         }
         self.belief.mean[2] = wrap(self.belief.mean[2]);
         for k in (0..self.landmarks.len()).rev() {
@@ -310,7 +325,7 @@ impl Map {
         self.belief.append(&prior.mean, &prior.variance);
         self.landmarks.push(Landmark { id: bearing.id, last_seen: self.step, strikes: 0 });
         let fits = self.fits(k, bearing, settings.gate)
-            && self.belief.update_iterated(3, |x| vec![linearise(x, k, bearing)]).is_some();
+            && self.belief.update_iterated(3, |_| f64::INFINITY, |x| vec![linearise(x, k, bearing)]).is_ok();
         if !fits {
             self.drop_landmark(k);
             self.banned.insert(bearing.id, self.step + 3);

@@ -7,7 +7,7 @@
 //!    snapshot; the best one says where to drive from the first second on.
 //! 2. **Homing.** Once that answer is sharp and without rival, the map is built anew with home as the anchor: the landmarks'
 //!    directions from there stand in the snapshot, and the robot's pose in the home frame is all that control needs. The
-//!    [`smoother`] does it from everything stored so far, and does it again a few times, ever more seldom, so that no
+//!    [`smoother`] does it from everything stored so far, and does it again ever more seldom, so that no
 //!    linearisation from the time when ranges were unknown survives.
 //!
 //! A step that the wheels do not explain is given more noise until the bearings fit ([`motion`]). Where no noise of the wheels'
@@ -57,6 +57,9 @@ pub struct FilterSettings {
     pub sideways_slip_share: f64,
     /// A bearing whose normalised innovation squared exceeds this is refused (chi-square, one degree of freedom; 10.8 is 0.1 %).
     pub gate: f64,
+    /// A step's bearings are refused, the worst first, until their joint normalised innovation squared is at most `gate` and this
+    /// much for each bearing after the first. The bearings of a wrong match each fit a wide belief; together they do not.
+    pub joint_gate: f64,
     /// Landmarks in the state at most.
     pub max_landmarks: usize,
     /// Home is adopted once its position is known to this share of its distance...
@@ -86,6 +89,7 @@ impl Default for FilterSettings {
             slip_persistence: 0.6,
             sideways_slip_share: 0.3,
             gate: 10.8,
+            joint_gate: 4.0,
             max_landmarks: 60,
             adopt_sd_share: 0.06,
             adopt_sd_m: 0.04,
@@ -124,6 +128,9 @@ const FIRST_ANCHOR_REACH_M: f64 = 0.5;
 const FIRST_ANCHOR_DIRECTION_SD: f64 = 0.7;
 /// Share of a landmark's stored bearings that may miss the gate before the smoother drops the landmark.
 const MISFIT_SHARE: f64 = 0.3;
+/// Steps between two runs of the smoother, as this part of those stored. With half as many runs the NEES on the way home is above
+/// its band half of the time (`wayhome bound lab`); with twice as many it is hardly better.
+const REBUILD_SHARE: usize = 12;
 /// Times that the smoother is run at most, each time without what did not fit the time before.
 const SMOOTHER_ROUNDS: usize = 4;
 /// Greatest mean squared normalised residual of a solution that is believed.
@@ -156,8 +163,8 @@ struct Stored {
 enum Stage {
     /// `guess`: home in the first anchor's frame, by the best hypothesis.
     Search { guess: Option<Pose> },
-    /// Steps stored when the smoother runs next, and the number of steps between.
-    Homing { next_rebuild: usize, interval: usize },
+    /// Steps stored when the smoother runs next.
+    Homing { next_rebuild: usize },
 }
 
 /// The filter.
@@ -172,6 +179,7 @@ pub struct AnchoredFilter {
     /// Where home may be, in the first anchor's frame, likeliest first; empty once home is found.
     hypotheses: Vec<Hypothesis>,
     bad_steps: u32,
+    steady_steps: u32,
     restarts: u32,
 }
 
@@ -188,6 +196,7 @@ impl AnchoredFilter {
             slip: SlipWatch::default(),
             hypotheses: Vec::new(),
             bad_steps: 0,
+            steady_steps: 0,
             restarts: 0,
         }
     }
@@ -199,6 +208,7 @@ impl AnchoredFilter {
         self.history.clear();
         self.hypotheses.clear();
         self.bad_steps = 0;
+        self.steady_steps = 0;
         self.restarts += 1;
     }
 
@@ -220,6 +230,12 @@ impl AnchoredFilter {
     #[must_use]
     pub fn estimate(&self) -> Option<Estimate> {
         (matches!(self.stage, Stage::Homing { .. }) && self.bad_steps <= 1).then(|| self.map.estimate())
+    }
+
+    /// Steps in a row that the bearings have borne out the estimate.
+    #[must_use]
+    pub fn steady_steps(&self) -> u32 {
+        self.steady_steps
     }
 
     /// The robot's pose in the home frame by the best hypothesis; no covariance is claimed.
@@ -321,12 +337,22 @@ impl AnchoredFilter {
 
     fn track(&mut self, mut moved: Moved, bearings: &[Bearing]) -> StepReport {
         let mut update = self.map.update(bearings, &self.settings, 2, moved.loosened, true);
-        if update.contradicted && self.bad_steps > 0 && self.relocate(bearings) {
-            let delta = moved.before.to_local(&self.map.pose());
-            moved.motion = Motion { delta, covariance: Matrix3::identity() };
-            update = self.map.update(bearings, &self.settings, 3, true, true);
+        if update.contradicted && self.bad_steps > 0 {
+            let stood = self.map.clone();
+            if self.relocate(bearings) {
+                let found = self.map.pose();
+                let relocated = self.map.update(bearings, &self.settings, 3, true, true);
+                if relocated.contradicted {
+                    self.map = stood;
+                } else {
+                    update = relocated;
+                    moved.motion = Motion { delta: moved.before.to_local(&found), covariance: Matrix3::identity() };
+                    self.steady_steps = 0;
+                }
+            }
         }
         self.bad_steps = if update.contradicted { self.bad_steps + 1 } else { 0 };
+        self.steady_steps = if update.contradicted { 0 } else { self.steady_steps + 1 };
         if self.bad_steps > self.settings.patience_steps {
             self.restart();
             return self.search(moved, bearings);
@@ -336,13 +362,13 @@ impl AnchoredFilter {
             self.adopt_strangers(&mut update);
         }
         self.store(moved.motion, &update);
-        if let Stage::Homing { next_rebuild, interval } = self.stage
+        if let Stage::Homing { next_rebuild } = self.stage
             && self.history.len() >= next_rebuild
             && next_rebuild <= self.settings.history_steps
         {
             self.rebuild();
-            let interval = interval + interval.div_ceil(2);
-            self.stage = Stage::Homing { next_rebuild: self.history.len() + interval, interval };
+            // The older the run, the less one more step changes where its bearings are linearised.
+            self.stage = Stage::Homing { next_rebuild: self.history.len() + self.history.len().div_ceil(REBUILD_SHARE) };
         }
         StepReport { matched: updated, rejected: update.rejected, nis: update.nis }
     }
@@ -362,7 +388,8 @@ impl AnchoredFilter {
         }
     }
 
-    /// Looks for the robot on the map by what it sees now, wherever it was believed to be.
+    /// Looks for the robot on the map by what it sees now, wherever it was believed to be. The map is not to be used where the bearings
+    /// contradict it even then.
     fn relocate(&mut self, bearings: &[Bearing]) -> bool {
         let sightings = self.map.sightings(bearings);
         let pose = self.map.pose();
@@ -431,8 +458,9 @@ impl AnchoredFilter {
         self.map = candidate;
         self.keep(&solution, motions);
         self.bad_steps = 0;
+        self.steady_steps = 0;
         self.hypotheses.clear();
-        self.stage = Stage::Homing { next_rebuild: self.history.len() + 1, interval: 1 };
+        self.stage = Stage::Homing { next_rebuild: self.history.len() + 1 };
     }
 
     /// How well the robot's place must be known at this distance from home, m.
