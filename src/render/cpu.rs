@@ -1,9 +1,10 @@
 //! The renderer that needs no graphics adapter. The twin of `shaders/panorama.wgsl`.
 //!
 //! First each column is laid out in runs of rows that show the same face (`hits`, `spans`). Then the picture is cut into bands
-//! of rows, which threads share, and whose colours fit into the second cache. In a band upright faces are shaded down their
-//! columns, where u and level of detail stay the same; then horizontal ones along the rows, where distance and level of detail
-//! do, as row after row is put into the picture. No pixel depends on how the work is cut, nor on the number of threads.
+//! of rows, which threads share, and these into tiles, whose colours fit into the second cache. A tile is painted group of
+//! columns by group of columns: upright faces down the columns, where u and level of detail stay the same; then horizontal ones
+//! along the rows, where distance and level of detail do, and one row looks at nearly the texels of the row before. At last the
+//! tile's rows are put into the picture. No pixel depends on how the work is cut, nor on the number of threads.
 
 use std::ops::Range;
 use std::sync::{Mutex, PoisonError};
@@ -22,10 +23,9 @@ use crate::panorama::Panorama;
 
 /// Most rows in a band: the unit of work of a thread.
 const BAND: usize = RUN;
-/// Most pixels in a band that is higher than [`LEAST_ROWS`]: low bands cut columns short, high ones leave the second cache.
-const BAND_PIXELS: usize = 384 << 10;
-/// Rows of a band of a very wide picture.
-const LEAST_ROWS: usize = 16;
+/// Most columns in a tile: the colours of wide ones leave the second cache; narrow ones write rows in pieces too short for the
+/// processor to see them coming, and picture memory is far away.
+const TILE: usize = 8 * POINTS;
 /// Colour where there is nothing.
 const VOID: u32 = 0xff00_0000;
 
@@ -128,8 +128,7 @@ impl Painter {
         self.spans.find(&self.frame, &self.hits);
         out.reshape(view.projection)?;
         let (width, height) = (view.projection.width as usize, view.projection.height as usize);
-        let most = (BAND_PIXELS / width).clamp(LEAST_ROWS, BAND);
-        let most = if share { most.min(height.div_ceil(rayon::current_num_threads())) } else { most };
+        let most = if share { BAND.min(height.div_ceil(rayon::current_num_threads())) } else { BAND };
         let rows = height.div_ceil(height.div_ceil(most));
         let size = rows * width;
         let paint_band = |(k, ((rgba, range), instance)): BandBuffers<'_>| {
@@ -174,16 +173,19 @@ struct Band<'a> {
     instance: &'a mut [u16],
 }
 
-/// Where a band is worked on.
+/// Where a tile is worked on.
 #[derive(Debug, Default)]
 struct Desk {
-    /// Colours, row by row, each a little longer than the picture's.
+    /// Colours, row by row, each a little longer than the tile's.
     colours: Vec<u32>,
     stride: usize,
     /// Changes of what a column shows, and for each row the number of the first of them, from 1.
     changes: Vec<Change>,
     first_change: Vec<u32>,
+    /// Horizontal surfaces that the group of columns at work sees.
     levels: Vec<Level>,
+    /// For each of them and each row the columns that see it, a bit each.
+    masks: Vec<u64>,
     /// What the columns show in the row at work.
     now: Now,
     columns: Columns,
@@ -206,7 +208,8 @@ impl Default for Columns {
 struct Change {
     /// Number of the next change of the same row; 0 where there is none.
     next: u32,
-    column: u32,
+    /// Column of the tile.
+    column: u16,
     instance: u16,
     /// Distance is `near`, and `height` times the inverse tangent of the row, and `room` times the distance of floor or ceiling.
     near: f32,
@@ -214,56 +217,45 @@ struct Change {
     room: f32,
 }
 
-/// What columns show in a row; see [`Change`].
+/// What the columns of a tile show in a row; see [`Change`].
 #[derive(Debug, Default)]
 struct Now {
     near: Vec<f32>,
     height: Vec<f32>,
     room: Vec<f32>,
     instance: Vec<u16>,
-    /// Directions of the columns, with some more at the end to make up whole groups.
-    directions: [Vec<f32>; 2],
 }
 
-/// Where a horizontal surface is seen in a group of columns: a bit for each of them, row after row.
+/// A horizontal surface that some columns of a group see, and the rows in which they may.
 #[derive(Debug)]
 struct Level {
-    group: usize,
     surface: u32,
     face: Face,
+    plane: Plane,
     rows: Range<usize>,
-    masks: Vec<u64>,
 }
 
 impl Desk {
-    /// Clears the desk for a band of so many rows.
-    fn prepare(&mut self, frame: &Frame, rows: usize) {
-        let width = frame.params.width as usize;
-        let whole = width.next_multiple_of(POINTS);
+    /// Clears the desk for so many rows and columns.
+    fn prepare(&mut self, rows: usize, columns: usize) {
         // Rows must not all fall into the same places of the cache, which repeat every 4 KiB.
-        self.stride = whole + LANES;
+        self.stride = columns.next_multiple_of(POINTS) + LANES;
         self.colours.resize(rows * self.stride, VOID);
         self.changes.clear();
-        self.levels.clear();
         self.first_change.clear();
         self.first_change.resize(rows, 0);
         let now = &mut self.now;
         for values in [&mut now.near, &mut now.height, &mut now.room] {
-            values.resize(width, 0.0);
+            values.resize(columns, 0.0);
         }
-        now.instance.resize(width, 0);
-        for (axis, values) in now.directions.iter_mut().enumerate() {
-            values.clear();
-            values.extend(frame.directions.iter().map(|d| d[axis]));
-            values.resize(whole, 0.0);
-        }
+        now.instance.resize(columns, 0);
     }
 
-    /// Puts the columns that were worked on into the rows, from column `first` on.
+    /// Puts the columns that were worked on into the rows, from column `first` of the tile on.
     #[inline(always)]
-    fn turn(&mut self, rows: usize, first: usize) {
+    fn turn(&mut self, first: usize) {
         let columns = &self.columns.0;
-        for (r, places) in self.colours.chunks_exact_mut(self.stride).enumerate().take(rows.min(RUN)) {
+        for (r, places) in self.colours.chunks_exact_mut(self.stride).enumerate().take(RUN) {
             if let Some(places) = places[first..].first_chunk_mut::<LANES>() {
                 for c in 0..LANES {
                     places[c] = columns[c][r];
@@ -278,23 +270,56 @@ impl Desk {
 fn paint(mut band: Band<'_>, desk: &mut Desk) {
     let width = band.frame.params.width as usize;
     let rows = band.range.len() / width;
-    desk.prepare(band.frame, rows);
     let mut runs = Vec::new();
-    for first in (0..width).step_by(LANES) {
-        for column in first..width.min(first + LANES) {
-            lay_out(&band, desk, rows, column, &mut runs);
+    let columns = width.div_ceil(width.div_ceil(TILE)).next_multiple_of(POINTS);
+    for first in (0..width).step_by(columns) {
+        let tile = first..width.min(first + columns);
+        desk.prepare(rows, tile.len());
+        for group in tile.clone().step_by(POINTS) {
+            let group = group..tile.end.min(group + POINTS);
+            desk.levels.clear();
+            desk.masks.clear();
+            for some in group.clone().step_by(LANES) {
+                for column in some..group.end.min(some + LANES) {
+                    lay_out(&band, desk, rows, column, first, &mut runs);
+                }
+                for run in runs.drain(..) {
+                    let colours = &mut desk.columns.0[run.column % LANES][run.start..];
+                    match &run.side {
+                        Some(side) => side.shade(band.frame, &mut desk.side, colours),
+                        None => colours[..run.count].fill(VOID),
+                    }
+                }
+                desk.turn(some - first);
+            }
+            shade_levels(&band, desk, group, first);
         }
-        for run in runs.drain(..) {
-            let colours = &mut desk.columns.0[run.column % LANES][run.start..];
-            match &run.side {
-                Some(side) => side.shade(band.frame, &mut desk.side, colours),
-                None => colours[..run.count].fill(VOID),
+        for row in 0..rows {
+            show_row(&mut band, desk, row, tile.clone());
+        }
+    }
+}
+
+/// Shades the horizontal surfaces that a group of columns sees.
+#[inline(always)]
+fn shade_levels(band: &Band<'_>, desk: &mut Desk, group: Range<usize>, first: usize) {
+    let frame = band.frame;
+    let (mut x, mut y) = ([0.0; POINTS], [0.0; POINTS]);
+    for (k, direction) in frame.directions[group.clone()].iter().take(POINTS).enumerate() {
+        [x[k], y[k]] = *direction;
+    }
+    let masks = desk.masks.chunks_exact(desk.first_change.len());
+    for (level, masks) in desk.levels.iter().zip(masks) {
+        let height = level.plane.height() - frame.params.camera_height;
+        let rows = desk.colours.chunks_exact_mut(desk.stride).enumerate();
+        for (number, colours) in rows.take(level.rows.end).skip(level.rows.start) {
+            let row = &frame.rows[band.first_row + number];
+            let t = if level.surface < 2 { row.plane } else { height * row.inverse_tan };
+            let sight = Sight { scene: band.scene, frame, row, t };
+            if let Some(colours) = colours[group.start - first..].first_chunk_mut() {
+                level.plane.shade(sight, [&x, &y], masks[number], &mut desk.point, colours);
             }
         }
-        desk.turn(rows, first);
-    }
-    for row in 0..rows {
-        show_row(&mut band, desk, row);
     }
 }
 
@@ -319,7 +344,7 @@ struct Run<'a> {
 
 /// Notes what a column shows. Texels of upright faces are asked for, so that they are there when the runs are shaded.
 #[inline(always)]
-fn lay_out<'a>(band: &Band<'a>, desk: &mut Desk, rows: usize, column: usize, runs: &mut Vec<Run<'a>>) {
+fn lay_out<'a>(band: &Band<'a>, desk: &mut Desk, rows: usize, column: usize, first: usize, runs: &mut Vec<Run<'a>>) {
     let (frame, eye) = (band.frame, band.frame.params.camera_height);
     let hits = band.hits.of(column);
     for span in band.spans.of(column) {
@@ -337,7 +362,7 @@ fn lay_out<'a>(band: &Band<'a>, desk: &mut Desk, rows: usize, column: usize, run
             (_, None) => room = 1.0,
         }
         let (next, instance) = (desk.first_change[start], (span.surface + 1) as u16);
-        desk.changes.push(Change { next, column: column as u32, instance, near, height, room });
+        desk.changes.push(Change { next, column: (column - first) as u16, instance, near, height, room });
         desk.first_change[start] = desk.changes.len() as u32;
         let count = end - start;
         match (span.face, hit) {
@@ -347,57 +372,46 @@ fn lay_out<'a>(band: &Band<'a>, desk: &mut Desk, rows: usize, column: usize, run
                 runs.push(Run { column, start, count, side: Some(side) });
             }
             _ if span.surface == NOTHING => runs.push(Run { column, start, count, side: None }),
-            _ => note_level(desk, span.surface, span.face, start..end, column),
+            _ => note_level(band, desk, span.surface, span.face, start..end, column - first),
         }
     }
 }
 
 /// Notes that rows of a column see a horizontal surface.
 #[inline(always)]
-fn note_level(desk: &mut Desk, surface: u32, face: Face, rows: Range<usize>, column: usize) {
-    let group = column / POINTS;
-    let mut of_group = desk.levels.iter().rev().take_while(|l| l.group == group);
-    let known = of_group.position(|l| l.surface == surface && l.face == face).map(|k| desk.levels.len() - 1 - k);
+fn note_level(band: &Band<'_>, desk: &mut Desk, surface: u32, face: Face, rows: Range<usize>, column: usize) {
+    let all_rows = desk.first_change.len();
+    let known = desk.levels.iter().position(|l| l.surface == surface && l.face == face);
     let k = known.unwrap_or_else(|| {
-        let masks = vec![0; desk.first_change.len()];
-        desk.levels.push(Level { group, surface, face, rows: rows.clone(), masks });
+        let plane = Plane::new(band.scene, band.frame, surface, face == Face::Underside);
+        desk.levels.push(Level { surface, face, plane, rows: rows.clone() });
+        desk.masks.resize(desk.masks.len() + all_rows, 0);
         desk.levels.len() - 1
     });
     let level = &mut desk.levels[k];
     level.rows = level.rows.start.min(rows.start)..level.rows.end.max(rows.end);
-    for mask in &mut level.masks[rows] {
+    for mask in &mut desk.masks[k * all_rows..][rows] {
         *mask |= 1 << (column % POINTS);
     }
 }
 
-/// Shades the horizontal surfaces of a row, and puts the row into the picture.
+/// Puts a tile's row into the picture.
 #[inline(always)]
-fn show_row(band: &mut Band<'_>, desk: &mut Desk, number: usize) {
+fn show_row(band: &mut Band<'_>, desk: &mut Desk, number: usize, columns: Range<usize>) {
     let frame = band.frame;
-    let width = frame.params.width as usize;
     let row = &frame.rows[band.first_row + number];
     let now = &mut desk.now;
     let mut next = desk.first_change[number] as usize;
     while let Some(change) = next.checked_sub(1).and_then(|k| desk.changes.get(k)) {
-        let column = change.column as usize;
+        let column = usize::from(change.column);
         (now.near[column], now.height[column], now.room[column]) = (change.near, change.height, change.room);
         now.instance[column] = change.instance;
         next = change.next as usize;
     }
-    let colours = &mut desk.colours[number * desk.stride..][..desk.stride];
-    for level in desk.levels.iter().filter(|l| l.rows.contains(&number)) {
-        let columns = POINTS * level.group..POINTS * (level.group + 1);
-        let [x, y] = now.directions.each_ref().map(|d| d[columns.clone()].first_chunk());
-        if let (Some(x), Some(y), Some(out)) = (x, y, colours[columns].first_chunk_mut()) {
-            let plane = Plane::new(band.scene, frame, level.surface, level.face == Face::Underside);
-            let height = plane.height() - frame.params.camera_height;
-            let t = if level.surface < 2 { row.plane } else { height * row.inverse_tan };
-            let sight = Sight { scene: band.scene, frame, row, t };
-            plane.shade(sight, [x, y], level.masks[number], &mut desk.point, out);
-        }
-    }
-    let places = width * number..width * (number + 1);
-    band.rgba[4 * places.start..4 * places.end].copy_from_slice(bytemuck::cast_slice(&colours[..width]));
+    let start = frame.params.width as usize * number + columns.start;
+    let places = start..start + columns.len();
+    let colours = &desk.colours[number * desk.stride..][..columns.len()];
+    band.rgba[4 * places.start..4 * places.end].copy_from_slice(bytemuck::cast_slice(colours));
     band.instance[places.clone()].copy_from_slice(&now.instance);
     show_ranges(*row, now, &mut band.range[places]);
 }
