@@ -43,6 +43,13 @@ impl Controller {
         Self { law, robot, task }
     }
 
+    /// The same with less of the drive's deceleration planned for, as a share of it: for floors on which tyres slide.
+    #[must_use]
+    pub fn braking_at(self, share: f64) -> Self {
+        let max_acceleration_m_s2 = share * self.robot.max_acceleration_m_s2;
+        Self { robot: RobotSheet { max_acceleration_m_s2, ..self.robot }, ..self }
+    }
+
     /// Yaw rate of the law alone, limited to the robot's, for a robot at `pose` in the home frame driving at `v`.
     ///
     /// The Lyapunov law is a relay. Sampled, a relay chatters by as much as the robot turns in one period; the yaw rate is

@@ -175,6 +175,14 @@ const ROLL_SHARE: f64 = 0.5;
 const STOP_SD_SHARE: f64 = 0.4;
 /// ... and the bearings of this many steps in a row bear it out.
 const STEADY_STEPS: u32 = 3;
+/// Where the robot went this much farther or less far in one step than its wheels told, the floor is slippery, m ...
+const SLIP_M: f64 = 0.003;
+/// ... and braking is begun as if the drive could do this share of it, ...
+const SLIPPERY_SHARE: f64 = 0.25;
+/// ... and home counts as reached only by a robot that moved less than this a step, m, ...
+const AT_REST_M: f64 = 0.0015;
+/// ... for so many steps in a row: wheels that stand still say nothing of a robot that slides on.
+const REST_STEPS: u32 = 5;
 /// Creeping speed while the estimate is home but not yet sure, m/s.
 const CREEP_M_S: f64 = 0.06;
 /// A filter that is home for this long without becoming sure starts again, s.
@@ -189,6 +197,12 @@ struct AnchoredHoming {
     /// Speed last commanded.
     speed_m_s: f64,
     unsure_since_s: Option<f64>,
+    /// Where the robot was believed to be at the step before.
+    stood: Option<Pose>,
+    /// Steps in a row in which it hardly moved.
+    rest_steps: u32,
+    /// Whether the floor has proved slippery.
+    slippery: bool,
     escape: Escape,
     arrived: bool,
 }
@@ -202,6 +216,9 @@ impl AnchoredHoming {
             max_acceleration_m_s2: briefing.robot.max_acceleration_m_s2,
             speed_m_s: 0.0,
             unsure_since_s: None,
+            stood: None,
+            rest_steps: 0,
+            slippery: false,
             escape: Escape::new(briefing.robot, briefing.task),
             arrived: false,
         }
@@ -212,13 +229,20 @@ impl AnchoredHoming {
         let range = estimate.range_m();
         // Braking from the speed last commanded takes this far; it may begin before home is reached.
         let rolling = self.speed_m_s * self.speed_m_s / (2.0 * self.max_acceleration_m_s2);
+        let moved = std::mem::replace(&mut self.stood, Some(estimate.pose))
+            .map_or(f64::INFINITY, |before| (estimate.pose.position() - before.position()).norm());
+        self.rest_steps = if moved <= AT_REST_M { self.rest_steps + 1 } else { 0 };
+        if !self.slippery && self.filter.greatest_slip_m() > SLIP_M {
+            self.slippery = true;
+            self.controller = self.controller.braking_at(SLIPPERY_SHARE);
+        }
         let near = range <= (STOP_SHARE * self.arrival_radius_m).max(rolling.min(ROLL_SHARE * self.arrival_radius_m));
         let passing = range <= 0.8 * self.arrival_radius_m && estimate.home_direction_rad().abs() > 1.4;
         if !(near || passing) {
             return (self.controller.drive(&estimate.pose), false);
         }
         if estimate.position_sd_m() <= STOP_SD_SHARE * self.arrival_radius_m && self.filter.steady_steps() >= STEADY_STEPS {
-            return (Twist::default(), true);
+            return (Twist::default(), !self.slippery || self.rest_steps >= REST_STEPS);
         }
         // At home by the mean but not sure of it: a slow circle brings parallax.
         let since = *self.unsure_since_s.get_or_insert(time_s);

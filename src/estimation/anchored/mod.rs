@@ -180,6 +180,7 @@ pub struct AnchoredFilter {
     hypotheses: Vec<Hypothesis>,
     bad_steps: u32,
     steady_steps: u32,
+    greatest_slip_m: f64,
     restarts: u32,
 }
 
@@ -197,6 +198,7 @@ impl AnchoredFilter {
             hypotheses: Vec::new(),
             bad_steps: 0,
             steady_steps: 0,
+            greatest_slip_m: 0.0,
             restarts: 0,
         }
     }
@@ -236,6 +238,12 @@ impl AnchoredFilter {
     #[must_use]
     pub fn steady_steps(&self) -> u32 {
         self.steady_steps
+    }
+
+    /// How far a step of the run lay from what the wheels told of it, at most, m, by the last run of the smoother.
+    #[must_use]
+    pub fn greatest_slip_m(&self) -> f64 {
+        self.greatest_slip_m
     }
 
     /// The robot's pose in the home frame by the best hypothesis; no covariance is claimed.
@@ -473,6 +481,11 @@ impl AnchoredFilter {
             stored.pose = *pose;
             stored.motion = motion;
         }
+        let slip = |pair: &[Stored]| {
+            let went = pair[0].pose.to_local(&pair[1].pose);
+            (went.position() - pair[1].motion.delta.position()).norm()
+        };
+        self.greatest_slip_m = self.history.windows(2).map(slip).fold(0.0, f64::max);
     }
 
     /// Builds the map of the second stage anew from all that is stored.

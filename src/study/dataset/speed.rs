@@ -158,8 +158,14 @@ fn measure_size(world: &World, size: (u32, u32), frames: usize, scratch: &Path) 
         (0..frames).into_par_iter().try_for_each(|k| encode_all(&pictures[k % SAMPLES]).map(|_| ()))?;
         Ok(per_s(start))
     };
-    let out = scratch.join(format!("wayhome-dataset-bench-{}", std::process::id()));
-    let pipeline = || -> Result<f64> {
+    let scratch = tempfile::Builder::new()
+        .prefix("wayhome-dataset-bench-")
+        .tempdir_in(scratch)
+        .map_err(crate::storage::io_error("make a folder in", scratch))?;
+    let pipeline = |round: usize| -> Result<f64> {
+        // A folder of its own, which stays until all is measured: some file systems are slow to create files after many were
+        // removed.
+        let out = scratch.path().join(round.to_string());
         let job = Job { plan: &plan, out: &out, shard: (1, 1), extras: &|_, _| Ok(Vec::new()) };
         // From when the scene is packed, as in the measure of rendering alone.
         let mut start = None;
@@ -167,18 +173,14 @@ fn measure_size(world: &World, size: (u32, u32), frames: usize, scratch: &Path) 
             start.get_or_insert_with(Instant::now);
             ControlFlow::Continue(())
         });
-        let rate = per_s(start.unwrap_or_else(Instant::now));
-        let removed = std::fs::remove_dir_all(&out);
-        made?;
-        removed.map_err(crate::storage::io_error("remove", &out))?;
-        Ok(rate)
+        made.map(|_| per_s(start.unwrap_or_else(Instant::now)))
     };
     let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().map_err(|e| Error::Threads(e.to_string()))?;
     // In turns, so that what else the machine does weighs on all alike.
     let mut rounds: [Vec<f64>; 5] = Default::default();
-    for _ in 0..ROUNDS {
+    for round in 0..ROUNDS {
         rounds[0].push(render()?);
-        rounds[1].push(pipeline()?);
+        rounds[1].push(pipeline(round)?);
         rounds[2].push(encode()?);
         rounds[3].push(one.install(render)?);
         rounds[4].push(one.install(encode)?);
