@@ -9,8 +9,9 @@ use crate::panorama::Panorama;
 
 /// Bytes of a pixel of a [`Panorama`]: colour, range and instance.
 const PIXEL_BYTES: usize = 10;
-/// Bytes of a group, where the pictures are so small that more than one a thread fits: they stay in the processor's caches.
-const GROUP_BYTES: usize = 8 << 20;
+/// Bytes of a group, where the pictures are so small that more than one a thread fits: enough of them that no thread waits long at
+/// the end of a group.
+const GROUP_BYTES: usize = 32 << 20;
 /// Most pictures of a group for each thread: more would only let the first result wait longer.
 const MOST_PER_THREAD: usize = 16;
 

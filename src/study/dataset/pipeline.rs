@@ -3,8 +3,8 @@
 //! Pictures are rendered in groups ([`Renderer::render_batch`]). While one group is rendered, the one before it goes through the
 //! camera, its truth is found and its files are encoded and hashed, each picture on one thread of the pool; a thread of its own
 //! writes files that are done, in the frames' order. What is in memory at once does not grow with the set: two groups of
-//! panoramas (together 2 to 32 a thread, the fewer the larger they are), the encoded files of one group, at most eight
-//! frames that wait to be written, the truth of one part, and the scene and home panorama of one condition. Only the
+//! panoramas (together 2 to 32 a thread, the fewer the larger they are), the encoded files of one group, at most 32
+//! frames or some 64 MiB that wait to be written, the truth of one part, and the scene and home panorama of one condition. Only the
 //! plan's poses grow with the set, some 50 bytes each.
 
 use std::io::Write;
@@ -28,8 +28,12 @@ use crate::random::Seed;
 use crate::render::{Camera, Renderer, Scene, View};
 use crate::storage::{GrowingFile, free_bytes, io_error, sha256};
 
-/// Most frames that wait to be written.
-const QUEUE: usize = 8;
+/// Most frames that wait to be written: fewer, and threads stand still while the file system is busy.
+const QUEUE: usize = 32;
+/// Most bytes that these may take, roughly.
+const QUEUE_BYTES: usize = 64 << 20;
+/// Bytes of a pixel in the files of a frame, roughly.
+const FILE_BYTES: usize = 2;
 /// Parts whose views are handed to the renderer at once.
 const BATCH: usize = 32;
 /// What a set may need beyond the estimate from one panorama, as pictures differ.
@@ -188,7 +192,8 @@ impl Job<'_> {
         let views: Vec<View<'_>> =
             frames.iter().map(|f| View { projection: plan.projection, robot: f.robot, bodies: &bodies }).collect();
         let layout = plan.request().layout;
-        let (sender, receiver) = sync_channel::<Encoded>(QUEUE);
+        let queue = (QUEUE_BYTES / (FILE_BYTES * plan.projection.pixels())).clamp(2, QUEUE);
+        let (sender, receiver) = sync_channel::<Encoded>(queue);
         let writer = Writer { folder, document, layout };
         std::thread::scope(|scope| {
             let writing = scope.spawn(move || writer.write_parts(parts, &condition_names(plan, parts), &receiver));
