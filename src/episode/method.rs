@@ -229,7 +229,9 @@ impl AnchoredHoming {
         let range = estimate.range_m();
         // Braking from the speed last commanded takes this far; it may begin before home is reached.
         let rolling = self.speed_m_s * self.speed_m_s / (2.0 * self.max_acceleration_m_s2);
-        let moved = std::mem::replace(&mut self.stood, Some(estimate.pose))
+        let moved = self
+            .stood
+            .replace(estimate.pose)
             .map_or(f64::INFINITY, |before| (estimate.pose.position() - before.position()).norm());
         self.rest_steps = if moved <= AT_REST_M { self.rest_steps + 1 } else { 0 };
         if !self.slippery && self.filter.greatest_slip_m() > SLIP_M {
