@@ -115,7 +115,7 @@ pub enum DatasetCommand {
         #[arg(long, default_value = "lab")]
         world: String,
         /// Panoramas of a round
-        #[arg(long, value_name = "N", default_value = "400", value_parser = clap::value_parser!(u32).range(1..=100_000))]
+        #[arg(long, value_name = "N", default_value = "1500", value_parser = clap::value_parser!(u32).range(1..=100_000))]
         frames: u32,
         /// Folder for the page [default: none]
         #[arg(long, value_name = "DIR")]
