@@ -240,7 +240,8 @@ impl AnchoredFilter {
         self.steady_steps
     }
 
-    /// How far a step of the run lay from what the wheels told of it, at most, m, by the last run of the smoother.
+    /// How far a step of the run lay from what the wheels told of it beyond what is usual of wheels, at most, m, by the last run of the
+    /// smoother.
     #[must_use]
     pub fn greatest_slip_m(&self) -> f64 {
         self.greatest_slip_m
@@ -481,11 +482,17 @@ impl AnchoredFilter {
             stored.pose = *pose;
             stored.motion = motion;
         }
-        let slip = |pair: &[Stored]| {
-            let went = pair[0].pose.to_local(&pair[1].pose);
-            (went.position() - pair[1].motion.delta.position()).norm()
+        // Beyond what is usual for wheels that turn, and change their speed, as much.
+        let settings = &self.settings;
+        let slip = |steps: &[Stored]| {
+            let (past, told) = (steps[1].motion.delta, steps[2].motion.delta);
+            let went = steps[1].pose.to_local(&steps[2].pose).position();
+            let length = told.position().norm();
+            let turned = 0.5 * settings.track_m * wrap(told.heading - past.heading).abs();
+            let changed = (length - past.position().norm()).abs() + turned;
+            (went - told.position()).norm() - 3.0 * (settings.speed_noise_share * length + settings.slip_share * changed)
         };
-        self.greatest_slip_m = self.history.windows(2).map(slip).fold(0.0, f64::max);
+        self.greatest_slip_m = self.history.windows(3).map(slip).fold(0.0, f64::max);
     }
 
     /// Builds the map of the second stage anew from all that is stored.
