@@ -58,7 +58,7 @@ pub struct FilterSettings {
     /// A bearing whose normalised innovation squared exceeds this is refused (chi-square, one degree of freedom; 10.8 is 0.1 %).
     pub gate: f64,
     /// A step's bearings are refused, the worst first, until their joint normalised innovation squared is at most `gate` and this
-    /// much for each bearing after the first. The bearings of a wrong match each fit a wide belief; together they do not.
+    /// much for each bearing after the first. Wrong matches may each fit a wide belief; together they do not.
     pub joint_gate: f64,
     /// Landmarks in the state at most.
     pub max_landmarks: usize,
@@ -128,8 +128,8 @@ const FIRST_ANCHOR_REACH_M: f64 = 0.5;
 const FIRST_ANCHOR_DIRECTION_SD: f64 = 0.7;
 /// Share of a landmark's stored bearings that may miss the gate before the smoother drops the landmark.
 const MISFIT_SHARE: f64 = 0.3;
-/// Steps between two runs of the smoother, as this part of those stored. With half as many runs the NEES on the way home is above
-/// its band half of the time (`wayhome bound lab`); with twice as many it is hardly better.
+/// Steps between two runs of the smoother, as this part of those stored. Over 400 runs on the paths of seeds 1, 3 and 5 in `lab`
+/// (`wayhome bound`) the NEES is in its 95 % band in 137 of 198 steps with 12; in 125 with 8, in 157 with 30, which takes twice the time of 8.
 const REBUILD_SHARE: usize = 12;
 /// Times that the smoother is run at most, each time without what did not fit the time before.
 const SMOOTHER_ROUNDS: usize = 4;
