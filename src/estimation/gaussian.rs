@@ -177,7 +177,7 @@ impl Gaussian {
             factor.compute(&self.covariance, &batch).ok_or(Refused::Singular)?;
             let back = &prior - &iterate;
             let innovation: Vec<f64> = batch.iter().map(|m| m.innovation - m.row.dot(back.as_slice())).collect();
-            let (step, squared) = factor.step(innovation.clone());
+            let (step, squared) = factor.step(&innovation);
             if nis.is_none() && squared > joint_gate(batch.len()) {
                 return Err(Refused::Jointly { worst: factor.worst(&innovation) });
             }
@@ -238,8 +238,9 @@ impl Factor {
     }
 
     /// Gain times innovation, and innovation' S^-1 innovation.
-    fn step(&self, mut innovation: Vec<f64>) -> (DVector<f64>, f64) {
+    fn step(&self, innovation: &[f64]) -> (DVector<f64>, f64) {
         let (n, m) = (self.n, self.m);
+        let mut innovation = innovation.to_vec();
         let mut squared = 0.0;
         for j in 0..m {
             let column = &self.l[j * m + j..(j + 1) * m];

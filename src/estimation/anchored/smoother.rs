@@ -276,7 +276,7 @@ impl Stretch<'_> {
 }
 
 /// Subtracts from `ll` (column-major, n x n, from the diagonal down) the outer product of two lists of n vectors, given by components.
-/// Most of the smoother's time is spent here; plain loops vectorise without a change of the result.
+/// Plain loops over components vectorise, which vectors of three do not; the result is the same.
 #[multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
 fn subtract_products(ll: &mut [f64], [(px, tx), (py, ty), (pz, tz)]: &[(Vec<f64>, Vec<f64>); 3]) {
     let n = px.len();
