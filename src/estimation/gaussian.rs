@@ -4,12 +4,12 @@
 //! innovation covariance S = H P H' + R = L L', the gain form P - W W', W = P H' L'^-1, keeps the covariance symmetric by
 //! construction.
 //!
-//! Plain loops stand where a matrix product could: library kernels pick fused multiply-adds by processor, and then the same
-//! seed would not give the same bytes everywhere. Nearly all time goes into two of them, which the compiler turns into vector
-//! instructions: one adds four columns to one at a time, one works on tiles of eight rows and eight measurements. An update of n components by m bearings takes about n^2 m / 2
-//! multiplications for the covariance and n m^2 / 2 for W, and each iterate m^3 / 6 for L.
+//! The arithmetic is that of [`super::dense`]. An update of n components by m bearings takes about n^2 m / 2 multiplications for
+//! the covariance and n m^2 / 2 for W, and each iterate m^3 / 6 for L.
 
 use nalgebra::{DMatrix, DVector};
+
+use super::dense::{TILE, add_columns, factorise_lower, solve_lower, solve_transposed, subtract_squared};
 
 /// Most non-zero entries of one measurement's Jacobian row.
 const ROW_CAPACITY: usize = 8;
@@ -41,9 +41,9 @@ impl SparseRow {
     }
 }
 
-/// An iterate that changes no component by more than this is the last: a thousandth of the noise of the
-/// sharpest bearings.
-const SETTLED: f64 = 1e-6;
+/// An iterate that changes no component by more than this, m, rad or 1/m, is the last: linearised elsewhere by so little, a
+/// bearing to something 0.3 m away would differ by 1e-5 rad.
+const SETTLED: f64 = 1e-3;
 
 /// A scalar measurement, linearised.
 #[derive(Debug, Clone, Copy)]
@@ -210,9 +210,6 @@ pub enum Refused {
     },
 }
 
-/// Measurements whose share of P - W W' is worked out together.
-const BLOCK: usize = 8;
-
 /// P H' and the Cholesky factor of S for one batch. The buffers are used again for the next one.
 #[derive(Default)]
 struct Factor {
@@ -241,21 +238,9 @@ impl Factor {
     fn step(&self, innovation: &[f64]) -> (DVector<f64>, f64) {
         let (n, m) = (self.n, self.m);
         let mut innovation = innovation.to_vec();
-        let mut squared = 0.0;
-        for j in 0..m {
-            let column = &self.l[j * m + j..(j + 1) * m];
-            let (now, later) = innovation[j..].split_at_mut(1);
-            now[0] /= column[0];
-            squared += now[0] * now[0];
-            for (v, l) in later.iter_mut().zip(&column[1..]) {
-                *v -= l * now[0];
-            }
-        }
-        for j in (0..m).rev() {
-            let column = &self.l[j * m + j..(j + 1) * m];
-            let known: f64 = column[1..].iter().zip(&innovation[j + 1..]).map(|(l, v)| l * v).sum();
-            innovation[j] = (innovation[j] - known) / column[0];
-        }
+        solve_lower(&self.l, 0, &mut innovation);
+        let squared = innovation.iter().map(|v| v * v).sum();
+        solve_transposed(&self.l, &mut innovation);
         let mut step = DVector::zeros(n);
         add_columns(step.as_mut_slice(), m, |k| innovation[k], |k| &self.p_ht[k * n.next_multiple_of(TILE)..]);
         (step, squared)
@@ -265,22 +250,13 @@ impl Factor {
     /// make of it: (S^-1 v)_i / sqrt((S^-1)_ii) is greatest.
     fn worst(&self, innovation: &[f64]) -> usize {
         let m = self.m;
-        let solve = |right: &mut [f64], first: usize| {
-            for j in first..m {
-                right[j] /= self.l[j * m + j];
-                let known = right[j];
-                for (v, l) in right[j + 1..].iter_mut().zip(&self.l[j * m + j + 1..(j + 1) * m]) {
-                    *v -= l * known;
-                }
-            }
-        };
         let mut whitened = innovation.to_vec();
-        solve(&mut whitened, 0);
+        solve_lower(&self.l, 0, &mut whitened);
         let mut unit = vec![0.0; m];
         let squared = |i: usize| {
             unit.fill(0.0);
             unit[i] = 1.0;
-            solve(&mut unit, i);
+            solve_lower(&self.l, i, &mut unit);
             let (dot, square) = unit[i..].iter().zip(&whitened[i..]).fold((0.0, 0.0), |(d, s), (u, w)| (d + u * w, s + u * u));
             dot * dot / square
         };
@@ -290,7 +266,7 @@ impl Factor {
 
     /// P - W W'. P H' becomes W.
     fn downdate(&mut self, p: &mut DMatrix<f64>) {
-        downdate(p.as_mut_slice(), &mut self.p_ht, &self.l, self.n);
+        subtract_squared(p.as_mut_slice(), &mut self.p_ht, &self.l, self.n);
     }
 }
 
@@ -309,142 +285,7 @@ fn factorise(p_ht: &mut [f64], l: &mut [f64], p: &[f64], batch: &[Linearised]) -
         }
         l[j * m + j] += measurement.variance;
     }
-    for j in 0..m {
-        let (done, rest) = l.split_at_mut(j * m);
-        let column = &mut rest[j..m];
-        add_columns(column, j, |k| -done[k * m + j], |k| &done[k * m + j..]);
-        let square = column[0];
-        if !(square > 0.0 && square.is_finite()) {
-            return false;
-        }
-        let root = square.sqrt();
-        column[0] = root;
-        column[1..].iter_mut().for_each(|v| *v /= root);
-    }
-    true
-}
-
-/// P - W W', a block of measurements after the other. `w` is P H' at first, and W in the end.
-#[multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
-fn downdate(p: &mut [f64], w: &mut [f64], l: &[f64], n: usize) {
-    let stride = n.next_multiple_of(TILE);
-    let m = w.len() / stride;
-    let (mut factors, mut rows) = (Vec::new(), Vec::new());
-    for first in (0..m).step_by(BLOCK) {
-        let count = BLOCK.min(m - first);
-        let (done, rest) = w.split_at_mut(first * stride);
-        let block = &mut rest[..count * stride];
-        factors.clear();
-        factors.extend((0..first + count).map(|k| -> [f64; BLOCK] {
-            std::array::from_fn(|j| if j < count && first + j >= k { l[k * m + first + j] } else { 0.0 })
-        }));
-        solve_block(done, block, &factors, stride);
-        subtract_block(p, block, &mut rows, n, stride);
-    }
-    for c in 0..n {
-        for r in (c + 1)..n {
-            p[r * n + c] = p[c * n + r];
-        }
-    }
-}
-
-/// Rows that are worked on together: a vector of the widest kind.
-const TILE: usize = 8;
-
-/// The columns of W that follow those that are `done`, from those of P H': W L' = P H'. `factors` are the rows of L that belong to
-/// them, a column of L after the other.
-#[inline(always)]
-fn solve_block(done: &[f64], block: &mut [f64], factors: &[[f64; BLOCK]], stride: usize) {
-    let (count, before) = (block.len() / stride, done.len() / stride);
-    for first in (0..stride).step_by(TILE) {
-        let tile = |column: &[f64]| column[first..].first_chunk::<TILE>().copied().unwrap_or_default();
-        let mut solved = [[0.0; TILE]; BLOCK];
-        for (solved, column) in solved.iter_mut().zip(block.chunks_exact(stride)) {
-            *solved = tile(column);
-        }
-        for (column, factors) in done.chunks_exact(stride).zip(factors) {
-            let known = tile(column);
-            for (solved, factor) in solved.iter_mut().zip(factors) {
-                for i in 0..TILE {
-                    solved[i] -= factor * known[i];
-                }
-            }
-        }
-        for j in 0..count {
-            let (earlier, later) = solved.split_at_mut(j);
-            for (earlier, factors) in earlier.iter().zip(&factors[before..]) {
-                for i in 0..TILE {
-                    later[0][i] -= factors[j] * earlier[i];
-                }
-            }
-            let scale = 1.0 / factors[before + j][j];
-            later[0].iter_mut().for_each(|v| *v *= scale);
-        }
-        for (solved, column) in solved.iter().zip(block.chunks_exact_mut(stride)) {
-            column[first..first + TILE].copy_from_slice(solved);
-        }
-    }
-}
-
-/// P - W W' for at most [`BLOCK`] columns of W, from the diagonal down. What is above the diagonal means nothing afterwards.
-///
-/// A tile of rows of W stays in registers while all columns of P that have these rows pass by. Tiles are counted from the last
-/// row, so that what is left over is a small triangle at the top. `rows` is room for W by rows.
-#[inline(always)]
-fn subtract_block(p: &mut [f64], w: &[f64], rows: &mut Vec<[f64; BLOCK]>, n: usize, stride: usize) {
-    rows.clear();
-    rows.resize(n, [0.0; BLOCK]);
-    for (k, column) in w.chunks_exact(stride).enumerate() {
-        for (row, value) in rows.iter_mut().zip(column) {
-            row[k] = *value;
-        }
-    }
-    let top = n % TILE;
-    for c in 0..top {
-        for r in c..top {
-            let product: f64 = rows[c].iter().zip(&rows[r]).map(|(a, b)| a * b).sum();
-            p[c * n + r] -= product;
-        }
-    }
-    for first in (top..n).step_by(TILE) {
-        let tile: [[f64; TILE]; BLOCK] = std::array::from_fn(|k| std::array::from_fn(|i| rows[first + i][k]));
-        for (row, column) in rows[..first + TILE].iter().zip(p.chunks_exact_mut(n)) {
-            if let Some(column) = column[first..].first_chunk_mut::<TILE>() {
-                let mut sum = *column;
-                for (factor, tile) in row.iter().zip(&tile) {
-                    for i in 0..TILE {
-                        sum[i] -= factor * tile[i];
-                    }
-                }
-                *column = sum;
-            }
-        }
-    }
-}
-
-/// Adds `count` columns, the k-th times `factor(k)`, to `sum`, one after the other. A column may be longer than `sum`.
-#[inline(always)]
-fn add_columns<'a>(sum: &mut [f64], count: usize, factor: impl Fn(usize) -> f64, column: impl Fn(usize) -> &'a [f64]) {
-    let fours = count - count % 4;
-    for k in (0..fours).step_by(4) {
-        add_four(sum, std::array::from_fn(|i| factor(k + i)), column(k), column(k + 1), column(k + 2), column(k + 3));
-    }
-    for k in fours..count {
-        let f = factor(k);
-        for (s, v) in sum.iter_mut().zip(column(k)) {
-            *s += f * v;
-        }
-    }
-}
-
-/// Where the time goes. Slices of one length, as arguments of their own, let the compiler drop all checks and use vectors.
-#[inline(always)]
-fn add_four(sum: &mut [f64], f: [f64; 4], a: &[f64], b: &[f64], c: &[f64], d: &[f64]) {
-    let n = sum.len();
-    let (a, b, c, d) = (&a[..n], &b[..n], &c[..n], &d[..n]);
-    for i in 0..n {
-        sum[i] = sum[i] + f[0] * a[i] + f[1] * b[i] + f[2] * c[i] + f[3] * d[i];
-    }
+    factorise_lower(l, m)
 }
 
 #[cfg(test)]

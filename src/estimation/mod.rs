@@ -6,6 +6,7 @@
 //! - [`resection`] and [`gaussian`] serve the anchored filter.
 
 pub mod anchored;
+mod dense;
 pub mod gaussian;
 pub mod observability;
 pub mod paper;

@@ -165,8 +165,8 @@ pub fn speed_page(f: &Findings) -> String {
         "# Making data sets\n\nMade by `wayhome dataset bench --out results/dataset`. Processor: {}. World: `{}`.\n\n## The whole way to disk\n\n\
          Colours, range and instances as PNG, truth, sums; CPU renderer; random poses; medians of rounds of {} panoramas that take \
          turns. Panoramas a second:\n\n\
-         | size | threads | rendering alone | encoding alone | the whole | of the slower alone | most that is possible | rendering, one \
-         thread | encoding, one thread | the whole of the slower of these |\n|---|---|---|---|---|---|---|---|---|---|\n",
+         | size | layout | threads | rendering alone | encoding alone | the whole | of the slower alone | most that is possible | \
+         rendering, one thread | encoding, one thread | the whole of the slower of these |\n|---|---|---|---|---|---|---|---|---|---|---|\n",
         f.processor,
         f.world,
         f.rates.first().map_or(0, |r| r.frames)
@@ -174,9 +174,10 @@ pub fn speed_page(f: &Findings) -> String {
     for r in &f.rates {
         let _ = writeln!(
             text,
-            "| {} x {} | {} | {:.0} | {:.0} | {:.0} | {:.0} % | {:.0} % | {:.0} | {:.0} | {:.0} % |",
+            "| {} x {} | `{}` | {} | {:.0} | {:.0} | {:.0} | {:.0} % | {:.0} % | {:.0} | {:.0} | {:.0} % |",
             r.width,
             r.height,
+            r.layout.name(),
             r.threads,
             r.render_per_s,
             r.encode_per_s,
@@ -190,7 +191,8 @@ pub fn speed_page(f: &Findings) -> String {
     }
     text += "\nRendering and encoding both keep every processor busy, so that together they cannot be as fast as the slower of them with all \
              processors to itself: \"most that is possible\" is the inverse of the sum of their times. The last column holds the whole against the \
-             slower of the two with one thread each, which is what a pipeline of one thread a stage comes to at best.\n\n## Codings\n\n";
+             slower of the two with one thread each, which is what a pipeline of one thread a stage comes to at best. `folder` is a file for each \
+             picture and for its truth, which costs the operating system time; `webdataset` puts them into archives.\n\n## Codings\n\n";
     let [width, height] = f.codings_px;
     let _ = write!(
         text,
@@ -212,10 +214,11 @@ pub fn speed_text(f: &Findings) -> String {
     for r in &f.rates {
         let _ = writeln!(
             text,
-            "{} x {}, {} threads: rendering {:.0}/s, encoding {:.0}/s, whole {:.0}/s: {:.0} % of the slower, of {:.0} % possible; \
+            "{} x {}, {}, {} threads: rendering {:.0}/s, encoding {:.0}/s, whole {:.0}/s: {:.0} % of the slower, of {:.0} % possible; \
              {:.0} % of the slower on one thread each ({:.0}/s, {:.0}/s)",
             r.width,
             r.height,
+            r.layout.name(),
             r.threads,
             r.render_per_s,
             r.encode_per_s,

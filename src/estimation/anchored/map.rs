@@ -76,14 +76,21 @@ pub struct Map {
 /// Bearing of a landmark from a pose with its derivatives by (x, y, heading, direction, inverse range).
 #[must_use]
 pub fn predict_bearing(pose: &Pose, direction_rad: f64, inverse_range: f64) -> (f64, [f64; 5]) {
-    let (s, c) = sin_cos(direction_rad);
+    let ([gx, gy], derivatives) = sight_line(pose, sin_cos(direction_rad), inverse_range);
+    (atan2(gy, gx) - pose.heading, derivatives)
+}
+
+/// The vector g along which a landmark is seen, in the anchor frame, and the derivatives of its angle less the heading; of the
+/// landmark's direction sine and cosine are given.
+#[must_use]
+pub(super) fn sight_line(pose: &Pose, (s, c): (f64, f64), inverse_range: f64) -> ([f64; 2], [f64; 5]) {
     let (gx, gy) = (c - inverse_range * pose.x, s - inverse_range * pose.y);
     // g vanishes where the robot stands on the landmark; the derivative is held finite there.
     let n = (gx * gx + gy * gy).max(1e-9);
     let (qx, qy) = (-gy / n, gx / n);
     let by_pose = [-inverse_range * qx, -inverse_range * qy, -1.0];
     let by_landmark = [-qx * s + qy * c, -(qx * pose.x + qy * pose.y)];
-    (atan2(gy, gx) - pose.heading, [by_pose[0], by_pose[1], by_pose[2], by_landmark[0], by_landmark[1]])
+    ([gx, gy], [by_pose[0], by_pose[1], by_pose[2], by_landmark[0], by_landmark[1]])
 }
 
 impl Map {

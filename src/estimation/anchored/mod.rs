@@ -129,8 +129,8 @@ const FIRST_ANCHOR_DIRECTION_SD: f64 = 0.7;
 /// Share of a landmark's stored bearings that may miss the gate before the smoother drops the landmark.
 const MISFIT_SHARE: f64 = 0.3;
 /// Steps between two runs of the smoother, as this part of those stored. Over 400 runs on the paths of seeds 1, 3 and 5 in `lab`
-/// (`wayhome bound`) the NEES is in its 95 % band in 137 of 198 steps with 12; in 125 with 8, in 157 with 30, which takes twice the time of 8.
-const REBUILD_SHARE: usize = 12;
+/// (`wayhome bound`) the NEES is in its 95 % band in 156 of 198 steps with 24; in 137 with 12, and in 157 with 30.
+const REBUILD_SHARE: usize = 24;
 /// Times that the smoother is run at most, each time without what did not fit the time before.
 const SMOOTHER_ROUNDS: usize = 4;
 /// Greatest mean squared normalised residual of a solution that is believed.
@@ -459,7 +459,8 @@ impl AnchoredFilter {
         let supposed = best.pose.to_local(&self.map.pose()).position();
         let Some((ids, solution, motions)) = self.smooth(ids, start) else { return };
         let sharp = |e: &Estimate| e.position_sd_m() <= self.sharp_sd(e.range_m());
-        let candidate = Map::from_solution(&ids, solution.mean.clone(), solution.covariance.clone());
+        let Some((mean, covariance)) = solution.last() else { return };
+        let candidate = Map::from_solution(&ids, mean, covariance);
         let estimate = candidate.estimate();
         if ids.len() < 3 || !sharp(&estimate) || (estimate.pose.position() - supposed).norm() > 4.0 * sharp_sd {
             return;
@@ -506,8 +507,9 @@ impl AnchoredFilter {
         if let Some((kept, solution, motions)) = self.smooth(ids, start)
             && kept.len() >= 3
             && 2 * kept.len() > held
+            && let Some((mean, covariance)) = solution.last()
         {
-            self.map.replace(&kept, solution.mean.clone(), solution.covariance.clone());
+            self.map.replace(&kept, mean, covariance);
             self.keep(&solution, motions);
         }
     }
@@ -553,21 +555,19 @@ impl AnchoredFilter {
             let solution = stretch.solve(start)?;
             let mut seen = vec![(0_usize, 0_usize); ids.len()];
             let mut clean = true;
-            for (f, motion) in motions.iter_mut().enumerate().skip(1) {
-                let squared = stretch.motion_squared(&solution.at, f);
+            for (motion, &squared) in motions.iter_mut().zip(&solution.motions_squared) {
                 if !heavy_tails && squared > SLIP_GATE {
                     motion.covariance *= squared / 3.0;
                     clean = false;
                 }
             }
-            for (f, frame) in frames.iter().enumerate() {
-                for s in &frame.sightings {
-                    seen[s.landmark].0 += 1;
-                    if Stretch::residual_squared(&solution.at, f, s) > gate {
-                        seen[s.landmark].1 += 1;
-                        refused.push((f, ids[s.landmark]));
-                        clean = false;
-                    }
+            let sightings = frames.iter().enumerate().flat_map(|(f, frame)| frame.sightings.iter().map(move |s| (f, s)));
+            for ((f, s), &squared) in sightings.zip(&solution.residuals_squared) {
+                seen[s.landmark].0 += 1;
+                if squared > gate {
+                    seen[s.landmark].1 += 1;
+                    refused.push((f, ids[s.landmark]));
+                    clean = false;
                 }
             }
             let keeps = |k: usize| {
@@ -577,8 +577,9 @@ impl AnchoredFilter {
             };
             let kept: Vec<usize> = (0..ids.len()).filter(|&k| keeps(k)).collect();
             if !heavy_tails && (clean || round == SMOOTHER_ROUNDS) && kept.len() == ids.len() {
-                let (sum, count) = solution.chi_square;
-                return (sum <= GREATEST_MEAN_SQUARE * count as f64).then_some((ids, solution, motions));
+                let squares = &solution.residuals_squared;
+                let believed = squares.iter().sum::<f64>() <= GREATEST_MEAN_SQUARE * squares.len() as f64;
+                return believed.then_some((ids, solution, motions));
             }
             start = Iterate {
                 poses: solution.at.poses.clone(),

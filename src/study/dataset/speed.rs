@@ -26,9 +26,14 @@ const ROUNDS: usize = 5;
 /// Different panoramas that are encoded again and again.
 const SAMPLES: usize = 16;
 
+/// Layouts that are measured: a file for each picture, and many pictures in an archive.
+pub const LAYOUTS: [Layout; 2] = [Layout::Folder, Layout::Webdataset];
+
 /// Panoramas a second by themselves and all together.
 #[derive(Debug, Clone, Serialize)]
 pub struct Rates {
+    /// Layout of the set.
+    pub layout: Layout,
     /// Columns.
     pub width: u32,
     /// Rows.
@@ -107,7 +112,7 @@ pub fn measure(world: &World, frames: usize, scratch: &Path, watch: &dyn Fn(&str
         if watch(&format!("{width}x{height}")).is_break() {
             return Err(Error::Interrupted);
         }
-        rates.push(measure_size(world, (width, height), frames, scratch)?);
+        rates.extend(measure_size(world, (width, height), frames, scratch)?);
     }
     if watch("codings").is_break() {
         return Err(Error::Interrupted);
@@ -128,21 +133,21 @@ fn samples(world: &World, projection: Projection) -> Result<Vec<Panorama>> {
     Ok(seen)
 }
 
-fn request(frames: usize, size_px: (u32, u32)) -> Request {
+fn request(frames: usize, size_px: (u32, u32), layout: Layout) -> Request {
     Request {
         places: Places::Random(frames),
         headings: Headings::Random(1),
         conditions: vec![Condition::original()],
         size_px: Some(size_px),
-        layout: Layout::Folder,
+        layout,
         seed: 1,
         licence: "Apache-2.0".into(),
         command: "benchmark".into(),
     }
 }
 
-fn measure_size(world: &World, size: (u32, u32), frames: usize, scratch: &Path) -> Result<Rates> {
-    let plan = Plan::new(world, request(frames, size))?;
+fn measure_size(world: &World, size: (u32, u32), frames: usize, scratch: &Path) -> Result<Vec<Rates>> {
+    let plan = Plan::new(world, request(frames, size, LAYOUTS[0]))?;
     let projection = plan.projection;
     let (scene, bodies) = (Scene::new(world)?, world.body_poses());
     let views: Vec<_> = plan.stage_frames(0).map(|f| View { projection, robot: f.robot, bodies: &bodies }).collect();
@@ -162,10 +167,11 @@ fn measure_size(world: &World, size: (u32, u32), frames: usize, scratch: &Path) 
         .prefix("wayhome-dataset-bench-")
         .tempdir_in(scratch)
         .map_err(crate::storage::io_error("make a folder in", scratch))?;
-    let pipeline = |round: usize| -> Result<f64> {
+    let pipeline = |layout: Layout, round: usize| -> Result<f64> {
+        let plan = Plan::new(world, request(frames, size, layout))?;
         // A folder of its own, which stays until all is measured: some file systems are slow to create files after many were
         // removed.
-        let out = scratch.path().join(round.to_string());
+        let out = scratch.path().join(format!("{}-{round}", layout.name()));
         let job = Job { plan: &plan, out: &out, shard: (1, 1), extras: &|_, _| Ok(Vec::new()) };
         // From when the scene is packed, as in the measure of rendering alone.
         let mut start = None;
@@ -177,19 +183,34 @@ fn measure_size(world: &World, size: (u32, u32), frames: usize, scratch: &Path) 
     };
     let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().map_err(|e| Error::Threads(e.to_string()))?;
     // In turns, so that what else the machine does weighs on all alike.
-    let mut rounds: [Vec<f64>; 5] = Default::default();
+    let mut rounds: [Vec<f64>; 4] = Default::default();
+    let mut pipelines = LAYOUTS.map(|layout| (layout, Vec::new()));
     for round in 0..ROUNDS {
         rounds[0].push(render()?);
-        rounds[1].push(pipeline(round)?);
-        rounds[2].push(encode()?);
-        rounds[3].push(one.install(render)?);
-        rounds[4].push(one.install(encode)?);
+        rounds[1].push(encode()?);
+        for (layout, rates) in &mut pipelines {
+            rates.push(pipeline(*layout, round)?);
+        }
+        rounds[2].push(one.install(render)?);
+        rounds[3].push(one.install(encode)?);
     }
-    let [render_per_s, pipeline_per_s, encode_per_s, render_one_per_s, encode_one_per_s] =
-        rounds.map(|r| quantile(&r, 0.5).unwrap_or(f64::NAN));
+    let median = |rates: Vec<f64>| quantile(&rates, 0.5).unwrap_or(f64::NAN);
+    let [render_per_s, encode_per_s, render_one_per_s, encode_one_per_s] = rounds.map(median);
     let threads = rayon::current_num_threads();
     let (width, height) = size;
-    Ok(Rates { width, height, threads, frames, render_per_s, encode_per_s, render_one_per_s, encode_one_per_s, pipeline_per_s })
+    let rates = pipelines.map(|(layout, rates)| Rates {
+        layout,
+        width,
+        height,
+        threads,
+        frames,
+        render_per_s,
+        encode_per_s,
+        render_one_per_s,
+        encode_one_per_s,
+        pipeline_per_s: median(rates),
+    });
+    Ok(rates.into())
 }
 
 fn encode_all(panorama: &Panorama) -> Result<usize> {
