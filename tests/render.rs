@@ -5,12 +5,12 @@
 use parry2d::math::{Pose as ParryPose, Vector};
 use parry2d::query::{Ray, RayCast};
 use parry2d::shape::{ConvexPolygon, Cuboid, Segment, SharedShape};
-use wayhome::geometry::{Pose, Vector2, direction};
+use wayhome::geometry::{Pose, Twist, Vector2, direction};
 use wayhome::panorama::{INSTANCE_CEILING, INSTANCE_FLOOR, Panorama, Projection, ProjectionKind};
 use wayhome::random::Seed;
-use wayhome::render::{CpuRenderer, Renderer, SHADER, Scene, View};
+use wayhome::render::{Camera, CpuRenderer, Renderer, SHADER, Scene, View};
 use wayhome::world::spec::LightSpec;
-use wayhome::world::{Body, Footprint, Window, World, WorldSpec};
+use wayhome::world::{Body, Footprint, LightPreset, OpticsSpec, Window, World, WorldSpec};
 
 /// An L-shaped room with bodies of every shape, as high as the room.
 const HALL: &str = r#"
@@ -343,6 +343,68 @@ fn corners_are_darker_and_no_light_comes_from_nowhere() {
     assert!((level_at(&picture, 45_f64.to_radians() + 1e-9) - 102.0).abs() < 6.0);
     assert!((level_at(&picture, (2.5 / 3.0_f64).atan()) - 204.0 * (1.0 - 0.5 * 0.25)).abs() < 2.0);
     assert!(render(&world, Projection::new(64, 9), world.home).rgba.chunks(4).all(|p| p == [0, 0, 0, 255]));
+}
+
+#[test]
+fn exposure_scales_the_light_before_it_is_clipped() {
+    let mut spec = white_room("lamps = [{ position_m = [3, 4, 1.25], intensity = 1 }]").spec;
+    spec.light.ambient = 0.2;
+    let world = World::from_spec(&spec, "test").unwrap();
+    let projection = Projection::new(360, 45);
+    let bodies = world.body_poses();
+    let view = View { projection, robot: world.home, bodies: &bodies };
+    for exposure in [0.25, 1.0, 2.5, 4.0] {
+        let scene = Scene::new(&world).unwrap().under(LightPreset::Day, exposure);
+        let mut picture = Panorama::black(projection);
+        CpuRenderer::new().render(&scene, &view, &mut picture).unwrap();
+        // Straight behind the lamp, 2 m from it, and on a wall that it does not reach at a right angle.
+        for degrees in [90.0_f64, 60.0] {
+            let aside = 3.0 / degrees.to_radians().tan();
+            let square = 4.0 + aside * aside;
+            let light = 0.2 + 2.0 / square.sqrt() / square;
+            let (seen, wanted) = (level_at(&picture, degrees.to_radians()), (255.0 * exposure * light).min(255.0));
+            assert!((seen - wanted).abs() < 1.5, "{exposure} {degrees}: {seen}, {wanted}");
+        }
+    }
+}
+
+/// While the shutter is open an edge sweeps over the pixels at even speed: it becomes a straight ramp as long as its way. What is
+/// at the distance of a turning camera's wall moves by omega t, whatever the distance.
+#[test]
+fn an_edge_becomes_a_ramp_as_long_as_the_camera_turns() {
+    let grey = |level: u8| format!("{{ family = \"plain\", colour = [{level}, {level}, {level}] }}");
+    let world = world(&format!(
+        "name = \"edge\"\nhome = {{ x_m = 3, y_m = 3 }}\nrobot = {{ height_m = 1 }}\n[camera]\nheight_m = 1.25\nhorizon = 0.5\n\
+         [room]\noutline_m = [[0, 0], [6, 0], [6, 6], [0, 6]]\nwalls = [{}]\n[light]\nambient = 1\n[[landmarks]]\nname = \"screen\"\n\
+         position_m = [5, 3]\nheight_m = 2.4\nshape = {{ box = {{ size_m = [0.1, 2] }} }}\ntexture = {}\n",
+        grey(200),
+        grey(40)
+    ));
+    let projection = Projection::new(1440, 31);
+    let bodies = world.body_poses();
+    let view = View { projection, robot: world.home, bodies: &bodies };
+    let scene = Scene::new(&world).unwrap();
+    let still = render(&world, projection, world.home);
+    let edge = (1.0_f64 / 1.95).atan(); // of the screen's front face, to the left
+    for (shutter_s, omega) in [(0.1, 0.3), (0.05, -1.0), (0.2, 0.2)] {
+        let mut camera = Camera::new(OpticsSpec { shutter_s, ..OpticsSpec::default() });
+        let mut out = Panorama::empty();
+        let twist = Twist { v: 0.0, omega };
+        camera.take(&mut CpuRenderer::new(), &scene, &view, twist, Seed(0), &mut out).unwrap();
+        let way = shutter_s * f64::abs(omega);
+        let pictures = (way / projection.pixel_rad()).ceil();
+        for pixels in -12..=12 {
+            let azimuth = edge + f64::from(pixels) * projection.pixel_rad();
+            // The middle of the pixel that is looked at.
+            let column = (projection.column(azimuth) + 0.5).floor();
+            let from_edge = projection.azimuth(column) - edge;
+            let wanted = 120.0 + 160.0 * (from_edge / way).clamp(-0.5, 0.5);
+            let seen = level_at(&out, azimuth);
+            assert!((seen - wanted).abs() <= 80.0 / pictures + 1.0, "{shutter_s} {omega}, {pixels}: {seen}, {wanted}");
+        }
+        // Range and instances are those of the middle of the exposure.
+        assert_eq!((&out.range_m, &out.instance), (&still.range_m, &still.instance));
+    }
 }
 
 #[test]
