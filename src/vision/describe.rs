@@ -1,6 +1,6 @@
 //! Descriptors: what the surroundings of a feature look like, as 128 bytes.
 //!
-//! A grid of 16 x 16 samples around the feature, spaced in proportion to its scale, is turned into gradients; those are
+//! A grid of 12 x 12 samples around the feature, spaced in proportion to its scale, is turned into gradients; those are
 //! summed into 4 x 4 cells of 8 directions each (Lowe 2004), upright. The square roots of the normalised sums are stored
 //! (Arandjelovic and Zisserman 2012) and compared by the sum of absolute differences: on rendered rooms this told right matches
 //! from wrong ones at least as well as the Euclidean distance, and it is the fastest distance that a processor has.
