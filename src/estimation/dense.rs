@@ -94,7 +94,9 @@ pub(super) fn inverse(l: &[f64], n: usize) -> DMatrix<f64> {
 pub(super) fn subtract_squared(p: &mut [f64], w: &mut [f64], l: &[f64], n: usize) {
     let stride = n.next_multiple_of(TILE);
     let m = w.len() / stride;
-    let (mut factors, mut rows) = (Vec::new(), Vec::new());
+    let (mut factors, mut rows) = (Vec::new(), Vec::<[f64; BLOCK]>::new());
+    // A last block is seldom full.
+    let mut few_rows = Vec::<[f64; BLOCK / 4]>::new();
     for first in (0..m).step_by(BLOCK) {
         let count = BLOCK.min(m - first);
         let (done, rest) = w.split_at_mut(first * stride);
@@ -106,7 +108,11 @@ pub(super) fn subtract_squared(p: &mut [f64], w: &mut [f64], l: &[f64], n: usize
             factors[from - first..count].copy_from_slice(&l[k * m + from..k * m + first + count]);
         }
         solve_block(done, block, &factors, stride);
-        subtract_block::<BLOCK>(p, block, block, &mut rows, [n, stride]);
+        if count <= BLOCK / 4 {
+            subtract_block(p, block, block, &mut few_rows, [n, stride]);
+        } else {
+            subtract_block(p, block, block, &mut rows, [n, stride]);
+        }
     }
     // What is above the diagonal, in squares: along a row each component is on a line of the cache of its own.
     for first_column in (0..n).step_by(TILE) {

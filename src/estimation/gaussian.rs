@@ -128,6 +128,12 @@ impl Gaussian {
         sum
     }
 
+    /// Whether the normalised innovation squared of a measurement that is linearised at the mean is within the gate.
+    #[must_use]
+    pub fn fits(&self, m: &Linearised, gate: f64) -> bool {
+        m.innovation * m.innovation <= gate * (self.variance_along(&m.row) + m.variance)
+    }
+
     /// Applies the linear map x -> F x to the first three components (the robot's pose) and adds noise `q` to them.
     pub fn propagate_pose(&mut self, f: &nalgebra::Matrix3<f64>, q: &nalgebra::Matrix3<f64>) {
         let n = self.len();

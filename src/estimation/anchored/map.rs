@@ -47,6 +47,23 @@ struct Landmark {
     strikes: u32,
 }
 
+/// Numbers of the landmarks by their ids, in order.
+struct Index(Vec<(LandmarkId, usize)>);
+
+impl Index {
+    fn get(&self, id: LandmarkId) -> Option<usize> {
+        self.0.binary_search_by_key(&id, |place| place.0).ok().map(|at| self.0[at].1)
+    }
+}
+
+/// A bearing of a landmark, by number, linearised at the mean before the update.
+#[derive(Clone, Copy)]
+struct Member {
+    landmark: usize,
+    bearing: Bearing,
+    linearised: Linearised,
+}
+
 /// What a measurement update did.
 #[derive(Debug, Clone, Default)]
 pub struct Update {
@@ -200,7 +217,7 @@ impl Map {
         let index = self.index();
         let (mut held, mut fits) = (0, [0; N]);
         for bearing in bearings {
-            let Some(&k) = index.get(&bearing.id) else { continue };
+            let Some(k) = index.get(bearing.id) else { continue };
             held += 1;
             let m = linearise(&self.belief.mean, k, bearing);
             let by_pose = Vector3::from_fn(|i, _| m.row.entries()[i].1);
@@ -220,7 +237,7 @@ impl Map {
         bearings
             .iter()
             .filter_map(|bearing| {
-                let (mean, covariance) = self.landmark(*index.get(&bearing.id)?);
+                let (mean, covariance) = self.landmark(index.get(bearing.id)?);
                 Some(resection::Sighting {
                     direction_rad: mean[0],
                     inverse_range: mean[1],
@@ -232,8 +249,10 @@ impl Map {
             .collect()
     }
 
-    fn index(&self) -> BTreeMap<LandmarkId, usize> {
-        self.landmarks.iter().enumerate().map(|(k, l)| (l.id, k)).collect()
+    fn index(&self) -> Index {
+        let mut places: Vec<_> = self.landmarks.iter().enumerate().map(|(k, l)| (l.id, k)).collect();
+        places.sort_unstable();
+        Index(places)
     }
 
     /// Measurement update with the landmarks that the map holds; gates each bearing, iterates, drops landmarks that keep failing.
@@ -256,7 +275,7 @@ impl Map {
                 update.rejected += 1;
                 continue;
             }
-            let Some(&k) = index.get(&bearing.id) else {
+            let Some(k) = index.get(bearing.id) else {
                 if self.banned.get(&bearing.id).is_none_or(|&until| until < self.step) {
                     update.strangers.push(*bearing);
                 } else {
@@ -264,17 +283,21 @@ impl Map {
                 }
                 continue;
             };
-            members.push((k, *bearing));
+            members.push(Member { landmark: k, bearing: *bearing, linearised: linearise(&self.belief.mean, k, bearing) });
         }
-        let held = members.clone();
-        members.retain(|(k, bearing)| self.fits(*k, bearing, settings.gate));
-        let linearised = |x: &DVector<f64>, members: &[(usize, Bearing)]| -> Vec<Linearised> {
-            members.iter().map(|(k, b)| linearise(x, *k, b)).collect()
+        let held: Vec<(usize, Bearing)> = members.iter().map(|m| (m.landmark, m.bearing)).collect();
+        members.retain(|m| self.belief.fits(&m.linearised, settings.gate));
+        let before = self.belief.mean.clone();
+        let linearised = |x: &DVector<f64>, members: &[Member]| -> Vec<Linearised> {
+            if *x == before {
+                return members.iter().map(|m| m.linearised).collect();
+            }
+            members.iter().map(|m| linearise(x, m.landmark, &m.bearing)).collect()
         };
         if loosened && !members.is_empty() {
             let mut updated = self.clone();
             let fine = updated.belief.update_iterated(iterations, |_| f64::INFINITY, |x| linearised(x, &members)).is_ok();
-            members.retain(|(k, bearing)| fine && updated.fits(*k, bearing, settings.gate));
+            members.retain(|m| fine && updated.fits(m.landmark, &m.bearing, settings.gate));
         }
         // While ranges are unknown the linearisation at the prior mean is too poor for a verdict on all bearings together.
         let joint_gate = |count: usize| match settled {
@@ -302,7 +325,7 @@ impl Map {
         let mut used = members.iter().peekable();
         for (k, bearing) in held {
             let landmark = &mut self.landmarks[k];
-            if used.next_if(|m| m.1 == bearing).is_some() {
+            if used.next_if(|m| m.bearing == bearing).is_some() {
                 update.used.push(bearing);
                 landmark.last_seen = self.step;
                 landmark.strikes = landmark.strikes.saturating_sub(1);
@@ -322,8 +345,7 @@ impl Map {
     }
 
     fn fits(&self, k: usize, bearing: &Bearing, gate: f64) -> bool {
-        let m = linearise(&self.belief.mean, k, bearing);
-        m.innovation * m.innovation <= gate * (self.belief.variance_along(&m.row) + m.variance)
+        self.belief.fits(&linearise(&self.belief.mean, k, bearing), gate)
     }
 
     /// Adds a landmark with its prior and its first bearing; `false`, and no change, where the two do not fit.
