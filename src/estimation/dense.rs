@@ -174,12 +174,11 @@ fn subtract_done(
 #[inline(always)]
 fn solve_tile(mut tile: [[f64; TILE]; BLOCK], triangle: &[[f64; BLOCK]; BLOCK]) -> [[f64; TILE]; BLOCK] {
     for k in 0..BLOCK {
-        for i in 0..TILE {
-            tile[k][i] *= triangle[k][k];
-        }
+        tile[k].iter_mut().for_each(|v| *v *= triangle[k][k]);
+        let known = tile[k];
         for j in k + 1..BLOCK {
-            for i in 0..TILE {
-                tile[j][i] -= triangle[k][j] * tile[k][i];
+            for (v, known) in tile[j].iter_mut().zip(known) {
+                *v -= triangle[k][j] * known;
             }
         }
     }

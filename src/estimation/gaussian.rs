@@ -11,8 +11,8 @@ use nalgebra::{DMatrix, DVector};
 
 use super::dense::{TILE, add_columns, factorise_lower, solve_lower, solve_transposed, subtract_squared};
 
-/// Most non-zero entries of one measurement's Jacobian row.
-const ROW_CAPACITY: usize = 8;
+/// Most non-zero entries of one measurement's Jacobian row: a pose and a landmark.
+const ROW_CAPACITY: usize = 5;
 
 /// One row of a measurement Jacobian.
 #[derive(Debug, Clone, Copy, Default)]
@@ -37,7 +37,8 @@ impl SparseRow {
     /// Product with a dense vector.
     #[must_use]
     pub fn dot(&self, v: &[f64]) -> f64 {
-        self.entries().iter().map(|&(c, h)| h * v[c]).sum()
+        // Entries that are not used are zeros: a loop of one length is unrolled.
+        self.entries.iter().map(|&(c, h)| h * v[c]).sum()
     }
 }
 
@@ -234,7 +235,6 @@ impl Factor {
     fn compute(&mut self, p: &DMatrix<f64>, batch: &[Linearised]) -> Option<()> {
         let (n, m) = (p.nrows(), batch.len());
         (self.n, self.m) = (n, m);
-        self.p_ht.clear();
         self.p_ht.resize(n.next_multiple_of(TILE) * m, 0.0);
         self.l.resize(m * m, 0.0);
         factorise(&mut self.p_ht, &mut self.l, p.as_slice(), batch).then_some(())
@@ -283,7 +283,9 @@ fn factorise(p_ht: &mut [f64], l: &mut [f64], p: &[f64], batch: &[Linearised]) -
     let stride = p_ht.len() / m;
     let n = p.len().isqrt();
     for (j, measurement) in batch.iter().enumerate() {
-        let column = &mut p_ht[j * stride..][..n];
+        let column = &mut p_ht[j * stride..][..stride];
+        column.fill(0.0);
+        let column = &mut column[..n];
         let entries = measurement.row.entries();
         add_columns(column, entries.len(), |k| entries[k].1, |k| &p[entries[k].0 * n..]);
         for (i, other) in batch.iter().enumerate().skip(j) {
