@@ -4,7 +4,7 @@
 //! innovation covariance S = H P H' + R = L L', the gain form P - W W', W = P H' L'^-1, keeps the covariance symmetric by
 //! construction.
 //!
-//! The arithmetic is that of [`super::dense`]. An update of n components by m bearings takes about n^2 m / 2 multiplications for
+//! The arithmetic is that of `dense`. An update of n components by m bearings takes about n^2 m / 2 multiplications for
 //! the covariance and n m^2 / 2 for W, and each iterate m^3 / 6 for L.
 
 use nalgebra::{DMatrix, DVector};

@@ -331,7 +331,7 @@ fn pass_on(pl: &mut [f64], t: &mut [f64], right: &mut [f64], [inverse, cross]: [
     }
 }
 
-/// [`dense::subtract_block`] for the vectors of some poses.
+/// `dense::subtract_block` for the vectors of some poses.
 #[multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
 fn subtract_products(ll: &mut [f64], left: &[f64], right: &[f64], rows: &mut Vec<[f64; RANK]>) {
     let n = left.len() / RANK;
