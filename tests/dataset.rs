@@ -439,6 +439,14 @@ fn a_set_leads_home() {
         let setup = Setup { bearings: Bearings::Dataset, dataset: Some(choice), ..Setup::default() };
         Bench::new(&world, &setup).map(|_| ()).unwrap_err().to_string()
     };
+    // Of another world.
+    let setup = Setup {
+        bearings: Bearings::Dataset,
+        dataset: Some(DatasetChoice { folder: folder.path().to_owned(), ..DatasetChoice::default() }),
+        ..Setup::default()
+    };
+    let message = Bench::new(&World::open("gallery").unwrap(), &setup).map(|_| ()).unwrap_err().to_string();
+    assert!(message.contains("set of the world `lab`") && message.contains("home of `gallery`"), "{message}");
     let folder = folder.path().join("original");
     assert!(bad(DatasetChoice { folder: folder.clone(), ..DatasetChoice::default() }).contains("--dataset-spacing-m"));
     let elsewhere = Some(Place { i: 99, j: 0 });

@@ -83,8 +83,13 @@ impl DatasetField {
             let nearest = (0..own_at_home.len()).min_by(|a, b| off(a).total_cmp(&off(b))).ok_or_else(untold)?;
             let most = world.spec.task.arrival_radius_m;
             if off(&nearest) > most {
-                let found = format!("{:.3} m from home at the nearest", off(&nearest));
-                return Err(invalid("home panorama", found, &format!("a panorama within {most} m of the world's home")));
+                let mut found = format!("{:.3} m from home at the nearest", off(&nearest));
+                // The likeliest reason.
+                if let Some(other) = set.document().map(|d| &d.world).filter(|name| **name != world.spec.name) {
+                    found = format!("{found}, in a set of the world `{other}`");
+                }
+                let allowed = format!("a panorama within {most} m of the home of `{}`", world.spec.name);
+                return Err(invalid("home panorama", found, &allowed));
             }
             nearest
         } else {
