@@ -157,7 +157,11 @@ impl Stretch<'_> {
         Some(dense::inverse(&factor, 3 + 2 * self.priors.len()))
     }
 
+    /// `None` where there is nothing to solve for.
     fn given(&self) -> Option<Given> {
+        if self.frames.is_empty() || self.priors.is_empty() {
+            return None;
+        }
         let weights = self.frames.iter().map(|frame| frame.motion.covariance.try_inverse()).collect::<Option<_>>()?;
         let ray = |s: &Sighting| {
             let (sin, cos) = sin_cos(s.azimuth_rad);
@@ -407,6 +411,18 @@ mod tests {
             all.extend((0..2).map(|i| (l[i] - prior.mean[i]) / prior.variance[i].sqrt()));
         }
         all
+    }
+
+    #[test]
+    fn without_landmarks_or_steps_there_is_no_solution() {
+        let motion = Motion { delta: Pose::IDENTITY, covariance: Matrix3::identity() };
+        let frames = vec![Frame { motion, sightings: Vec::new() }; 3];
+        let prior = Prior { mean: [0.0, 0.4], variance: [1.0; 2] };
+        for (frames, priors) in [(&frames[..], &[][..]), (&[][..], &[prior][..]), (&[][..], &[][..])] {
+            let stretch = Stretch { frames, priors, heavy_tails: true };
+            let at = Iterate { poses: vec![Pose::IDENTITY; frames.len()], landmarks: vec![[0.0, 0.4]; priors.len()] };
+            assert!(stretch.covariance_at(&at).is_none() && stretch.solve(at).is_none());
+        }
     }
 
     /// Elimination pose by pose against one dense system of all poses and landmarks, whose Jacobian comes from differences: at the
