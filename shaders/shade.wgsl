@@ -71,8 +71,8 @@ struct Side {
     near: f32,
     point: vec2<f32>,
     normal: vec2<f32>,
-    material: Material,
-    u: i32,
+    surface: u32,
+    u: f32,
     slant: f32,
     foot: f32,
     glow: f32,
@@ -81,22 +81,21 @@ struct Side {
 }
 
 fn new_side(hit: Hit, direction: vec2<f32>) -> Side {
-    let material = materials[hit.surface];
+    let tiles_per_m = materials[hit.surface].tiles_per_m;
     let cosine = -dot(hit.normal, direction);
     let across = hit.near * params.pixel_rad;
     let slant = across / max(cosine, LEAST_COSINE);
     let foot = max(hit.bottom, 0.0);
-    let detail = level(material, strip_footprint(material, vec2<f32>(slant, across)));
-    let u = coordinate(hit.u, material, material.texels_per_m.x);
-    let v = coordinate(params.camera_height + hit.near * rows[0].tan - foot, material, material.texels_per_m.y);
-    let step = i32(across * material.texels_per_m.y * -65536.0);
+    let detail = level(hit.surface, strip_footprint(tiles_per_m, vec2<f32>(slant, across)));
+    let v = params.camera_height + hit.near * rows[0].tan - foot;
+    let strip = new_strip(tiles_per_m, hit.u, v, across, detail);
+    let u = within_tile(hit.u, tiles_per_m.x);
     let point = hit.near * direction;
     var open = 1.0;
     if params.corner_shade > 0.0 {
         open = 1.0 - params.corner_shade * nook(point, hit.normal);
     }
-    let strip = new_strip(material, u, v, step, detail);
-    return Side(strip, hit.near, point, hit.normal, material, u, slant, foot, glow_of(hit.surface), open);
+    return Side(strip, hit.near, point, hit.normal, hit.surface, u, slant, foot, glow_of(hit.surface), open);
 }
 
 fn shade_side(side: Side, row: u32) -> u32 {
@@ -123,13 +122,14 @@ fn shade_side(side: Side, row: u32) -> u32 {
         return light_up(sample_strip(side.strip, row), light);
     }
     let high = side.near * params.pixel_rad * rows[row].stretch * rows[row].stretch;
-    let detail = level(side.material, footprint(side.material, vec2<f32>(side.slant, high)));
-    let v = coordinate(z - side.foot, side.material, side.material.texels_per_m.y);
-    return light_up(sample_point(side.material, side.u, v, detail), light);
+    let tiles_per_m = materials[side.surface].tiles_per_m;
+    let detail = level(side.surface, footprint(tiles_per_m, vec2<f32>(side.slant, high)));
+    let v = within_tile(z - side.foot, tiles_per_m.y);
+    return light_up(sample_point(detail, coordinate(side.u, detail), coordinate(v, detail)), light);
 }
 
 struct Plane {
-    material: Material,
+    surface: u32,
     heading: vec2<f32>,
     camera: vec2<f32>,
     z: f32,
@@ -138,7 +138,6 @@ struct Plane {
 }
 
 fn new_plane(surface: u32, underside: bool) -> Plane {
-    let material = materials[surface];
     var camera = params.camera;
     var heading = vec2<f32>(1.0, 0.0);
     var z = select(0.0, params.room_height, underside);
@@ -150,9 +149,9 @@ fn new_plane(surface: u32, underside: bool) -> Plane {
         heading = body.heading;
         z = select(body.top, body.bottom, underside);
     }
-    let scale = material.texels_per_m;
-    camera = vec2<f32>(within_tile(camera.x, material, scale.x), within_tile(camera.y, material, scale.y));
-    return Plane(material, heading, camera, z, select(1.0, -1.0, underside), glow_of(surface));
+    let scale = materials[surface].tiles_per_m;
+    camera = vec2<f32>(within_tile(camera.x, scale.x), within_tile(camera.y, scale.y));
+    return Plane(surface, heading, camera, z, select(1.0, -1.0, underside), glow_of(surface));
 }
 
 fn shade_plane(plane: Plane, direction: vec2<f32>, t: f32, row: Row) -> u32 {
@@ -161,11 +160,13 @@ fn shade_plane(plane: Plane, direction: vec2<f32>, t: f32, row: Row) -> u32 {
     let across = t * params.pixel_rad;
     let spread = select(row.stretch * row.stretch, 1.0, params.equal_angle == 0u);
     let deep = across * abs(row.inverse_tan) * spread;
-    let scale = plane.material.texels_per_m;
-    let detail = level(plane.material, max(0.5 * max(deep, across), min(deep, across)) * max(scale.x, scale.y));
-    let texels = t * scale;
-    let u = round_small((texels.x * (cos * direction.x + sin * direction.y) + plane.camera.x) * 256.0) << 8u;
-    let v = round_small((texels.y * (cos * direction.y - sin * direction.x) + plane.camera.y) * 256.0) << 8u;
+    let scale = materials[plane.surface].tiles_per_m;
+    let detail = level(plane.surface, max(0.5 * max(deep, across), min(deep, across)) * max(scale.x, scale.y));
+    let size = f32(detail.size);
+    let texels = t * scale * size;
+    let camera = plane.camera * size;
+    let u = wrapped(texels.x * (cos * direction.x + sin * direction.y) + camera.x, detail);
+    let v = wrapped(texels.y * (cos * direction.y - sin * direction.x) + camera.y, detail);
     let point = t * direction;
     var light = params.ambient;
     if params.corner_shade > 0.0 {
@@ -184,5 +185,5 @@ fn shade_plane(plane: Plane, direction: vec2<f32>, t: f32, row: Row) -> u32 {
             light += lit_by_window(lamps[k], weight, dot(to, to), plane.z);
         }
     }
-    return light_up(sample_point(plane.material, u, v, detail), light);
+    return light_up(sample_point(detail, u, v), light);
 }

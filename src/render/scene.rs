@@ -14,16 +14,44 @@ use crate::panorama::INSTANCE_FIRST_WALL;
 use crate::world::spec::{LampSpec, LightFactors};
 use crate::world::{Body, Footprint, LightPreset, Pattern, Texture, Window, World};
 
-/// Where a surface's texture lies in the atlas. The layout is that of `Material` in `shaders/shade.wgsl`.
+/// Most levels of a texture.
+pub(super) const LEVELS: usize = texture::FINEST as usize + 1;
+
+/// Where a surface's texture lies in the atlas. The layout is that of `Material` in `shaders/sample.wgsl`.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 pub(super) struct Material {
-    /// Index in the atlas of the first texel of the finest level.
+    /// Tiles per metre of surface, along u and v. They differ for images that are not square.
+    pub tiles_per_m: [f32; 2],
+    /// Number of the coarsest level, of one texel.
+    pub last_level: u32,
+    pub padding: u32,
+    /// Each about a quarter of an octave coarser than the one before.
+    pub levels: [MipLevel; LEVELS],
+}
+
+/// A level of a texture: a square of texels, v fastest, with a border in which the tile goes on.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub(super) struct MipLevel {
+    /// Index in the atlas of the first texel of the border.
     pub base: u32,
-    /// Binary logarithm of the finest level's edge length in texels. The coarser levels follow, down to one texel.
-    pub log2_size: u32,
-    /// Texels of the finest level per metre of surface, along u and v. They differ for images that are not square.
-    pub texels_per_m: [f32; 2],
+    /// Texels along an edge, the border not counted.
+    pub size: u32,
+}
+
+impl MipLevel {
+    /// Texels along an edge, the border counted.
+    #[inline(always)]
+    pub fn pitch(self) -> u32 {
+        self.size + 2
+    }
+
+    /// Index in the atlas of texel (u, v), from -1 on.
+    #[inline(always)]
+    pub fn place(self, u: u32, v: u32) -> u32 {
+        self.base + u.wrapping_add(1) * self.pitch() + v.wrapping_add(1)
+    }
 }
 
 /// A body as far as its pose does not matter.
@@ -217,7 +245,7 @@ impl<'a> Surface<'a> {
 }
 
 /// Texels after the last texture, for vectors that read beyond a line that they need a part of.
-const PADDING: usize = 16;
+const PADDING: usize = 32;
 
 /// Bakes every texture once, also where several surfaces share it.
 fn pack(surfaces: &[Surface<'_>]) -> (Vec<Material>, Vec<u32>) {
@@ -231,19 +259,22 @@ fn pack(surfaces: &[Surface<'_>]) -> (Vec<Material>, Vec<u32>) {
             })
         })
         .collect();
-    let sizes = texture::log2_sizes(distinct.iter().map(|s| s.texture));
-    let baked: Vec<texture::Baked> = distinct.par_iter().zip(sizes).map(|(s, n)| texture::bake(s, n)).collect();
+    let fineness = texture::fineness(distinct.iter().map(|s| s.texture));
+    let baked: Vec<texture::Baked> = distinct.par_iter().zip(fineness).map(|(s, f)| texture::bake(s, f)).collect();
     let mut atlas = huge_pages::with_capacity(baked.iter().map(|b| b.texels.len()).sum::<usize>() + PADDING);
     let packed: Vec<Material> = baked
         .iter()
         .zip(&distinct)
         .map(|(b, s)| {
-            let base = atlas.len() as u32;
+            let mut base = atlas.len() as u32;
             atlas.extend_from_slice(&b.texels);
-            let size = f64::from(1_u32 << b.log2_size);
-            let scale = |axis: usize| (size / (s.texture.period_m[axis] * f64::from(b.periods[axis]))) as f32;
-            let texels_per_m = [scale(0), scale(1)];
-            Material { base, log2_size: b.log2_size, texels_per_m }
+            let tiles_per_m = [0, 1].map(|axis| (1.0 / (s.texture.period_m[axis] * f64::from(b.periods[axis]))) as f32);
+            let mut levels = [MipLevel { base, size: 1 }; LEVELS];
+            for (level, &size) in levels.iter_mut().zip(&b.sizes) {
+                *level = MipLevel { base, size };
+                base += level.pitch() * level.pitch();
+            }
+            Material { tiles_per_m, last_level: b.sizes.len() as u32 - 1, padding: 0, levels }
         })
         .collect();
     atlas.resize(atlas.len() + PADDING, 0);

@@ -8,10 +8,9 @@ use super::Scene;
 use super::columns::Hit;
 use super::frame::{Edge, Frame, Lamp, Row};
 use super::sample::{
-    LANES, POINTS, PointRoom, Points, RUN, Strip, StripRoom, coordinate, footprint, is_wanted, level, round, shade_point,
-    strip_footprint, within_tile,
+    LANES, POINTS, PointRoom, Points, RUN, Strip, StripRoom, footprint, is_wanted, level, shade_point, strip_footprint,
+    within_tile, wrapped,
 };
-use super::scene::Material;
 
 /// Least distance from a lamp that counts, squared, m^2: a lamp is no point.
 const LAMP_SIZE_SQUARED: f32 = 0.01;
@@ -126,8 +125,8 @@ impl<'a> Side<'a> {
         for ((colour, row), light) in out.iter_mut().zip(rows).zip(&room.light) {
             let high = near * frame.params.pixel_rad * row.stretch * row.stretch;
             let level = level(material, footprint(material, [self.slant, high]));
-            let v = coordinate(frame.params.camera_height + near * row.tan - foot, material, 1);
-            *colour = shade_point(atlas, material, [u, v], level, *light);
+            let v = within_tile(frame.params.camera_height + near * row.tan - foot, material, 1);
+            *colour = shade_point(atlas, level, [u, v], *light);
         }
     }
 
@@ -200,10 +199,10 @@ pub(super) struct Sight<'a> {
 /// A horizontal surface: floor, ceiling, or the top or underside of a body.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Plane {
-    material: Material,
+    surface: u32,
     /// Cosine and sine of the direction of its texture's axes.
     heading: [f32; 2],
-    /// The camera in those axes, texels, less whole periods.
+    /// The camera in those axes, in tiles, less whole ones.
     camera: [f32; 2],
     /// Height, m.
     z: f32,
@@ -218,7 +217,7 @@ impl Plane {
     #[inline(always)]
     pub fn new(scene: &Scene, frame: &Frame, surface: u32, underside: bool) -> Self {
         let p = &frame.params;
-        let material = scene.materials[surface as usize];
+        let material = &scene.materials[surface as usize];
         let (mut camera, mut heading) = (p.camera, [1.0, 0.0]);
         let mut z = if underside { p.room_height } else { 0.0 };
         if surface >= 2 {
@@ -228,8 +227,8 @@ impl Plane {
             heading = body.heading;
             z = if underside { body.bottom } else { body.top };
         }
-        let camera = [within_tile(camera[0], &material, 0), within_tile(camera[1], &material, 1)];
-        Self { material, heading, camera, z, up: if underside { -1.0 } else { 1.0 }, glow: glow(frame, surface) }
+        let camera = [within_tile(camera[0], material, 0), within_tile(camera[1], material, 1)];
+        Self { surface, heading, camera, z, up: if underside { -1.0 } else { 1.0 }, glow: glow(frame, surface) }
     }
 
     /// Height of the surface, m.
@@ -252,15 +251,18 @@ impl Plane {
         // Rows that are even in elevation are farther apart in its tangent.
         let spread = if frame.params.equal_angle == 0 { 1.0 } else { row.stretch * row.stretch };
         let deep = across * row.inverse_tan.abs() * spread;
-        let finest = self.material.texels_per_m[0].max(self.material.texels_per_m[1]);
-        let level = level(&self.material, (0.5 * deep.max(across)).max(deep.min(across)) * finest);
-        let texels = self.material.texels_per_m.map(|scale| t * scale);
+        let material = &scene.materials[self.surface as usize];
+        let [u_per_m, v_per_m] = material.tiles_per_m;
+        let level = level(material, (0.5 * deep.max(across)).max(deep.min(across)) * u_per_m.max(v_per_m));
+        let size = level.size as f32;
+        let texels = [t * u_per_m * size, t * v_per_m * size];
+        let camera = self.camera.map(|tiles| tiles * size);
         let (mut u, mut v) = ([0; POINTS], [0; POINTS]);
         for k in 0..POINTS {
-            u[k] = round((texels[0] * (cos * x[k] + sin * y[k]) + self.camera[0]) * 256.0) << 8;
-            v[k] = round((texels[1] * (cos * y[k] - sin * x[k]) + self.camera[1]) * 256.0) << 8;
+            u[k] = wrapped(texels[0] * (cos * x[k] + sin * y[k]) + camera[0], level);
+            v[k] = wrapped(texels[1] * (cos * y[k] - sin * x[k]) + camera[1], level);
         }
-        let points = Points { atlas: &scene.atlas, material: &self.material, u: &u, v: &v, level };
+        let points = Points { atlas: &scene.atlas, level, u: &u, v: &v };
         points.look_up(wanted, room);
         let (x, y, out) = (x.as_chunks().0, y.as_chunks().0, out.as_chunks_mut::<LANES>().0);
         for (block, ((x, y), out)) in x.iter().zip(y).zip(out).enumerate() {

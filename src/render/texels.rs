@@ -1,35 +1,53 @@
-//! The one place of this crate without checks: looking up texels whose places are known to be in their tile, and asking for
+//! The one place of this crate without checks: looking up texels whose places are known to be in their level, and asking for
 //! texels ahead of time.
 //!
-//! A third of the time of a picture goes into looking up texels, and half of that would go into checking places that a mask has
-//! just confined to the tile.
+//! A third of the time of a picture goes into looking up texels, and half of that would go into checking places that have
+//! just been confined to the level.
 
 #![allow(unsafe_code)]
 
-/// Texels of a tile, a power of two of them, and at least one more after them.
+use super::scene::MipLevel;
+
+/// Texels of a level.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Texels<'a> {
     texels: &'a [u32],
-    mask: u32,
+    pitch: u32,
+    /// The last place that has a neighbour along both axes.
+    last: u32,
 }
 
 impl<'a> Texels<'a> {
-    /// 2^`log2_count` texels of an atlas from `base` on.
+    /// The texels of a level in the atlas.
     ///
     /// # Panics
-    /// When the atlas does not have them and one more.
+    /// When the atlas does not have them.
     #[inline(always)]
-    pub fn new(atlas: &'a [u32], base: usize, log2_count: u32) -> Self {
-        let count = 1_usize << log2_count;
-        Self { texels: &atlas[base..=base + count], mask: count as u32 - 1 }
+    pub fn new(atlas: &'a [u32], level: MipLevel) -> Self {
+        let pitch = level.pitch();
+        let texels = &atlas[level.base as usize..][..(pitch * pitch) as usize];
+        // Three at least, but a shorter one would make `last` the place before the first.
+        assert!(pitch >= 2, "a level has borders");
+        Self { texels, pitch, last: pitch * pitch - pitch - 2 }
     }
 
-    /// The texel at `place` and the one that is stored after it. Places beyond the tile wrap around.
+    /// Where texel (u, v) is, from (-1, -1) on. Any number gives a place that [`Texels::square`] takes.
     #[inline(always)]
-    pub fn pair(&self, place: u32) -> [u32; 2] {
-        let place = (place & self.mask) as usize;
-        // SAFETY: `mask` is the length of the slice less 2, so that `place` and the place after it are in the slice.
-        unsafe { self.texels.as_ptr().add(place).cast::<[u32; 2]>().read() }
+    pub fn place(&self, u: u32, v: u32) -> u32 {
+        let place = u.wrapping_add(1).wrapping_mul(self.pitch).wrapping_add(v).wrapping_add(1);
+        place.min(self.last)
+    }
+
+    /// The texel at a place and the one after it along v, and the two that lie next to them along u.
+    #[inline(always)]
+    pub fn square(&self, place: u32) -> [[u32; 2]; 2] {
+        let near = place.min(self.last) as usize;
+        let far = near + self.pitch as usize;
+        // SAFETY: there are `pitch` squared texels, of which `far` is at most the last but one.
+        unsafe {
+            let at = |place: usize| self.texels.as_ptr().add(place).cast::<[u32; 2]>().read_unaligned();
+            [at(near), at(far)]
+        }
     }
 }
 

@@ -1,6 +1,7 @@
 //! A square canvas without borders: what is drawn over one edge comes in at the opposite one. Lengths are metres.
 
 use rand_pcg::rand_core::Rng;
+use rayon::prelude::*;
 
 use crate::random::Stream;
 
@@ -169,26 +170,74 @@ impl Canvas {
         }
     }
 
-    /// Averages two by two.
-    pub fn halve(&mut self) {
-        let (size, half) = (self.size, self.size / 2);
-        for u in 0..half {
-            for v in 0..half {
-                let at = |du: usize, dv: usize| self.pixels[(2 * u + du) * size + 2 * v + dv];
-                let (a, b, c, d) = (at(0, 0), at(0, 1), at(1, 0), at(1, 1));
-                // Index u * half + v has been read before: it lies before (2 u) * size + 2 v.
-                self.pixels[u * half + v] = std::array::from_fn(|k| 0.25 * (a[k] + b[k] + c[k] + d[k]));
-            }
-        }
-        self.size = half;
-        self.pixels.truncate(half * half);
+    /// The same with `size` pixels along an edge, at most as many as there are: each is the mean of what it covers.
+    pub fn shrunk(&self, size: usize) -> Self {
+        let shares = shares(self.size, size);
+        let mut pixels = vec![[0.0; 3]; size * size];
+        pixels.par_chunks_mut(size).zip(&shares).for_each_init(
+            || vec![[0.0_f32; 3]; self.size],
+            |line, (out, covered)| {
+                line.fill([0.0; 3]);
+                for &(u, share) in covered {
+                    let add = self.pixels[u * self.size..][..self.size].as_flattened();
+                    line.as_flattened_mut().iter_mut().zip(add).for_each(|(sum, x)| *sum += share * x);
+                }
+                for (out, covered) in out.iter_mut().zip(&shares) {
+                    for &(v, share) in covered {
+                        let colour = line[v];
+                        *out = std::array::from_fn(|c| out[c] + share * colour[c]);
+                    }
+                }
+            },
+        );
+        Self { size, pixels, ..*self }
     }
 
-    /// The pixels, packed with red in the lowest byte.
-    pub fn texels(&self) -> impl Iterator<Item = u32> + '_ {
-        self.pixels.iter().map(|c| {
-            let [r, g, b] = c.map(|x| (x + 0.5) as u32);
+    /// Appends the pixels, packed with red in the lowest byte, with a border of one pixel in which the tile goes on.
+    pub fn append_texels(&self, out: &mut Vec<u32>) {
+        let packed = |colour: &Colour| {
+            let [r, g, b] = colour.map(|x| (x + 0.5) as u32);
             r | g << 8 | b << 16 | 0xff00_0000
+        };
+        let mut append = |line: &[Colour]| {
+            out.push(packed(&line[self.size - 1]));
+            out.extend(line.iter().map(packed));
+            out.push(packed(&line[0]));
+        };
+        append(&self.pixels[self.size * (self.size - 1)..]);
+        self.pixels.chunks_exact(self.size).for_each(&mut append);
+        append(&self.pixels[..self.size]);
+    }
+}
+
+/// For each of `to` equal parts of a line of `from` pixels: the pixels that it covers, and their shares of it.
+pub(super) fn shares(from: usize, to: usize) -> Vec<Vec<(usize, f32)>> {
+    let scale = from as f64 / to as f64;
+    (0..to)
+        .map(|k| {
+            let (low, high) = (k as f64 * scale, (k + 1) as f64 * scale);
+            let last = (libm::ceil(high) as usize).min(from);
+            (low as usize..last)
+                .map(|p| {
+                    let covered = high.min((p + 1) as f64) - low.max(p as f64);
+                    (p, (covered / scale) as f32)
+                })
+                .collect()
         })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shares_add_up() {
+        for (from, to) in [(1, 8), (3, 4), (7, 7), (1000, 64), (5, 2)] {
+            let shares = shares(from, to);
+            assert!(shares.iter().all(|s| (s.iter().map(|(_, w)| w).sum::<f32>() - 1.0).abs() < 1e-5), "{from} {to}");
+            let all: f32 = shares.iter().flatten().filter(|(p, _)| *p == from - 1).map(|(_, w)| w).sum();
+            assert!((all - to as f32 / from as f32).abs() < 1e-4, "{from} {to}: {all}");
+        }
     }
 }

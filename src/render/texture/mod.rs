@@ -1,8 +1,9 @@
 //! Baking of textures: each surface's pattern, drawn from its seed, as a chain of ever coarser square tiles.
 //!
 //! A tile covers the square of `period_m` by `period_m` after which the pattern repeats, and joins itself at all borders. It
-//! is drawn at twice its resolution and averaged, then averaged two by two down to one texel. Within a level, texel (u, v) has
-//! index `u * size + v`: a column of the picture walks along v, thus along memory.
+//! is drawn at twice its resolution and averaged over ever larger texels, four levels an octave down to a single texel. Within a
+//! level v runs fastest: a column of the picture walks along v, thus along memory. A border of one texel, in which the tile
+//! goes on, saves who samples it from minding the edges.
 //!
 //! Patterns are drawn in metres. They carry detail from about 3 cm to 60 cm, so that something can be recognised from half a
 //! metre as well as from across a room, and no two places of a tile look alike. Images are stretched to a square tile, some
@@ -12,6 +13,8 @@ mod canvas;
 mod patterns;
 mod picture;
 
+use std::collections::VecDeque;
+
 use canvas::Canvas;
 
 use super::scene::Surface;
@@ -20,14 +23,16 @@ use crate::world::{Pattern, Texture, TextureFamily};
 
 /// A baked texture.
 pub(super) struct Baked {
-    /// Binary logarithm of the finest level's edge length.
-    pub log2_size: u32,
-    /// All levels, the finest first; red in the lowest byte.
+    /// Texels along an edge of each level, the finest first, borders not counted.
+    pub sizes: Vec<u32>,
+    /// All levels with their borders; red in the lowest byte.
     pub texels: Vec<u32>,
     /// Periods of the texture that the tile covers along u and v.
     pub periods: [u32; 2],
 }
 
+/// Levels an octave.
+const PER_OCTAVE: u32 = 4;
 /// Most texels of an atlas: 128 MiB, what every graphics device binds as one buffer.
 const ATLAS_TEXELS: usize = 32 << 20;
 /// A tile is made as fine as this, in metres a texel, ...
@@ -37,44 +42,59 @@ const FINE_M: f64 = 0.004;
 const SMALL: u32 = 9;
 /// Most texels along an edge, as a binary logarithm.
 const LARGEST: u32 = 11;
+/// The same as a fineness; see [`fineness`].
+pub(super) const FINEST: u32 = PER_OCTAVE * LARGEST;
 
+/// Coarser than this nothing is made, as a fineness.
+const COARSE: u32 = 2 * PER_OCTAVE;
 /// Texels of an image are no smaller than this, m: no camera here sees more.
 const FINEST_M: f64 = 0.001;
 
-/// Binary logarithms of the tiles' edge lengths in texels. All are coarsened alike where the atlas would get too large.
-pub(super) fn log2_sizes<'a>(textures: impl Iterator<Item = &'a Texture>) -> Vec<u32> {
+/// How fine tiles are: number of the coarsest level, which has one texel. All are coarsened alike where the atlas would get too
+/// large.
+pub(super) fn fineness<'a>(textures: impl Iterator<Item = &'a Texture>) -> Vec<u32> {
     let wanted = |texture: &Texture| {
         let period_m = texture.period_m[0].max(texture.period_m[1]);
         let reach = |texel_m: f64, most: u32| (0..most).find(|&n| f64::from(1 << n) * texel_m >= period_m).unwrap_or(most);
-        match &texture.pattern {
+        let log2_size = match &texture.pattern {
             Pattern::Family(TextureFamily::Plain) => 0,
             Pattern::Family(_) => reach(COARSEST_M, LARGEST).max(reach(FINE_M, SMALL)).max(4),
             Pattern::Image(picture) => {
                 let pixels = picture.width.max(picture.height);
                 pixels.next_power_of_two().ilog2().min(reach(FINEST_M, LARGEST)).max(1)
             }
-        }
+        };
+        PER_OCTAVE * log2_size
     };
-    let mut sizes: Vec<u32> = textures.map(wanted).collect();
-    while sizes.iter().map(|&n| texels(n)).sum::<usize>() > ATLAS_TEXELS && sizes.iter().any(|&n| n > 2) {
-        for n in sizes.iter_mut().filter(|n| **n > 2) {
-            *n -= 1;
+    let mut all: Vec<u32> = textures.map(wanted).collect();
+    while all.iter().map(|&f| texels(f)).sum::<usize>() > ATLAS_TEXELS && all.iter().any(|&f| f > COARSE) {
+        for f in all.iter_mut().filter(|f| **f > COARSE) {
+            *f -= 1;
         }
     }
-    sizes
+    all
 }
 
-/// Texels of all levels of a tile.
-fn texels(log2_size: u32) -> usize {
-    ((4 << (2 * log2_size)) - 1) / 3
+/// Texels along an edge of a level that is `fineness` levels finer than one texel.
+fn size(fineness: u32) -> u32 {
+    /// Powers of the fourth root of two, in 1/1024.
+    const ROOTS: [u32; PER_OCTAVE as usize] = [1024, 1218, 1448, 1722];
+    let root = ROOTS[(fineness % PER_OCTAVE) as usize];
+    ((root << (fineness / PER_OCTAVE)) + 512) >> 10
 }
 
-/// Draws a texture of 2^`log2_size` texels along each edge.
-pub(super) fn bake(surface: &Surface<'_>, log2_size: u32) -> Baked {
+/// Texels of all levels of a tile, with their borders.
+fn texels(fineness: u32) -> usize {
+    (0..=fineness).map(|f| (size(f) as usize + 2).pow(2)).sum()
+}
+
+/// Draws a texture in so many levels, less one.
+pub(super) fn bake(surface: &Surface<'_>, fineness: u32) -> Baked {
     let texture = surface.texture;
+    let log2_size = fineness.div_ceil(PER_OCTAVE);
     // Large tiles are drawn at their own resolution: what is beyond is seldom looked at so closely.
     let drawn = matches!(texture.pattern, Pattern::Family(_));
-    let twice = u32::from(drawn && log2_size <= SMALL);
+    let twice = u32::from(drawn && log2_size <= SMALL && fineness > 0);
     let mut canvas = Canvas::new(1 << (log2_size + twice), texture.period_m[0], texture.colour.map(f32::from));
     let mut stream = Seed(texture.seed).stream("texture");
     let mut periods = [1, 1];
@@ -93,17 +113,17 @@ pub(super) fn bake(surface: &Surface<'_>, log2_size: u32) -> Baked {
         }
     }
     canvas.weaken(texture.contrast.clamp(0.0, 1.0) as f32);
-    let mut all = Vec::with_capacity(texels(log2_size));
-    if twice == 1 {
-        canvas.halve();
+    let sizes: Vec<u32> = (0..=fineness).rev().map(size).collect();
+    let mut all = Vec::with_capacity(texels(fineness));
+    // Each level is made of the one an octave finer, those of the first octave of what was drawn.
+    let mut octave = VecDeque::with_capacity(PER_OCTAVE as usize);
+    for &size in &sizes {
+        let source = if octave.len() == PER_OCTAVE as usize { octave.pop_front() } else { None };
+        let level = source.as_ref().unwrap_or(&canvas).shrunk(size as usize);
+        level.append_texels(&mut all);
+        octave.push_back(level);
     }
-    for level in 0..=log2_size {
-        if level > 0 {
-            canvas.halve();
-        }
-        all.extend(canvas.texels());
-    }
-    Baked { log2_size, texels: all, periods }
+    Baked { sizes, texels: all, periods }
 }
 
 #[cfg(test)]
@@ -115,31 +135,39 @@ mod tests {
     }
 
     fn baked(texture: &Texture, log2_size: u32) -> Baked {
-        bake(&Surface::new(texture, false), log2_size)
+        bake(&Surface::new(texture, false), PER_OCTAVE * log2_size)
+    }
+
+    /// The finest level without its border.
+    fn finest(baked: &Baked) -> Vec<u32> {
+        let size = baked.sizes[0] as usize;
+        baked.texels.chunks(size + 2).skip(1).take(size).flat_map(|line| line[1..=size].to_vec()).collect()
     }
 
     #[test]
     fn bands_do_not_depend_on_u_and_plain_is_one_texel() {
         let bands = baked(&texture(TextureFamily::Bands, 4.0), 6);
-        let finest = &bands.texels[..64 * 64];
+        let finest = finest(&bands);
         assert!(finest.chunks(64).all(|line| line == &finest[..64]));
         assert!(finest[..64].iter().any(|t| *t != finest[0]));
         let plain = texture(TextureFamily::Plain, 4.0);
-        assert_eq!(baked(&plain, log2_sizes([&plain].into_iter())[0]).texels, [0xff5a_7896]);
+        let plain = baked(&plain, fineness([&plain].into_iter())[0]);
+        assert_eq!((plain.sizes, plain.texels), (vec![1], vec![0xff5a_7896; 9]));
     }
 
     #[test]
     fn an_atlas_keeps_its_budget_and_tiles_their_resolution() {
         let sizes = |periods: &[f64]| {
             let all: Vec<_> = periods.iter().map(|p| texture(TextureFamily::Noise, *p)).collect();
-            log2_sizes(all.iter())
+            fineness(all.iter())
         };
-        assert_eq!(sizes(&[1.0, 2.0, 4.0, 7.0, 16.0, 100.0]), [8, 9, 9, 10, 11, 11]);
+        let alone = [1.0, 2.0, 4.0, 7.0, 16.0, 100.0].map(|period_m| sizes(&[period_m])[0]);
+        assert_eq!(alone, [8, 9, 9, 10, 11, 11].map(|n| PER_OCTAVE * n));
         for count in [1, 30, 100, 1000] {
             let sizes = sizes(&vec![16.0; count]);
             assert!(sizes.iter().map(|n| texels(*n)).sum::<usize>() <= ATLAS_TEXELS, "{count}");
         }
-        assert_eq!(baked(&texture(TextureFamily::Noise, 7.0), 10).texels.len(), texels(10));
+        assert_eq!(baked(&texture(TextureFamily::Noise, 7.0), 10).texels.len(), texels(40));
     }
 
     #[test]
@@ -150,8 +178,9 @@ mod tests {
         let image = Texture { pattern: Pattern::Image(picture), contrast: 1.0, ..texture(TextureFamily::Plain, 1.0) };
         // Texels run up each line of u.
         let (white, black, base) = (0xffff_ffff, 0xff00_0000, 0xff5a_7896);
-        assert_eq!(bake(&Surface::new(&image, false), 1).texels[..4], [white, black, base, black]);
-        assert_eq!(bake(&Surface::new(&image, true), 1).texels[..4], [base, black, white, black]);
+        let seen = |mirrored: bool| finest(&bake(&Surface::new(&image, mirrored), PER_OCTAVE));
+        assert_eq!(seen(false), [white, black, base, black]);
+        assert_eq!(seen(true), [base, black, white, black]);
         let long = crate::world::Picture { width: 5, height: 2, rgba: vec![0; 40] };
         assert_eq!(picture::copies(&long), [1, 3], "so that 5 x 6 pixels are about a square");
     }

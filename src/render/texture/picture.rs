@@ -1,6 +1,6 @@
 //! Images as tiles.
 
-use super::canvas::Colour;
+use super::canvas::{Colour, shares};
 use crate::world::Picture;
 
 /// How often an image that is not square stands in its tile, along u and v. A tile that covers about as much along u as along v
@@ -44,36 +44,4 @@ pub(super) fn stretch(picture: &Picture, ground: [u8; 3], size: usize, mirrored:
         }
     }
     tile
-}
-
-/// For each of `to` equal parts of a line of `from` pixels: the pixels that it covers, and their shares of it.
-fn shares(from: usize, to: usize) -> Vec<Vec<(usize, f32)>> {
-    let scale = from as f64 / to as f64;
-    (0..to)
-        .map(|k| {
-            let (low, high) = (k as f64 * scale, (k + 1) as f64 * scale);
-            let last = (libm::ceil(high) as usize).min(from);
-            (low as usize..last)
-                .map(|p| {
-                    let covered = high.min((p + 1) as f64) - low.max(p as f64);
-                    (p, (covered / scale) as f32)
-                })
-                .collect()
-        })
-        .collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn shares_add_up() {
-        for (from, to) in [(1, 8), (3, 4), (7, 7), (1000, 64), (5, 2)] {
-            let shares = shares(from, to);
-            assert!(shares.iter().all(|s| (s.iter().map(|(_, w)| w).sum::<f32>() - 1.0).abs() < 1e-5), "{from} {to}");
-            let all: f32 = shares.iter().flatten().filter(|(p, _)| *p == from - 1).map(|(_, w)| w).sum();
-            assert!((all - to as f32 / from as f32).abs() < 1e-4, "{from} {to}: {all}");
-        }
-    }
 }
