@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use super::contest::Order;
+use super::contest::{Order, range};
 use super::tables::start_error_name;
 use super::{Section, Target, short};
 use crate::control::Law;
@@ -159,14 +159,12 @@ fn rows(e: &Evidence<'_>) -> Vec<Row> {
         Row {
             claim: "Convergence is \"always\" faster than that of existing techniques (IV-C, Fig. 8)",
             measured: format!(
-                "Told the true start and with the same law, its mean time is {:.1} to {:.1} % (own set) and {:.1} to {:.1} % (Vardy's) \
+                "Told the true start and with the same law, its mean time is {} (own set) and {} (Vardy's) \
                  less than the vector laws'; start by start it is beaten in {} of {} and {} of {} pairs; {} and {} of the {} vector laws with \
                  a compass and the nonlinear law have a lower mean time than it has with the proportional one. The anchored filter, told \
                  nothing, has {} times the straight-line time with the proportional law where the paper's has {:.3} (own set)",
-                percent_of_theirs(orders[0].least_percent),
-                percent_of_theirs(orders[0].most_percent),
-                percent_of_theirs(orders[1].least_percent),
-                percent_of_theirs(orders[1].most_percent),
+                range(orders[0].percent.map(|p| p.map(percent_of_theirs))),
+                range(orders[1].percent.map(|p| p.map(percent_of_theirs))),
                 orders[0].beaten,
                 orders[0].pairs,
                 orders[1].beaten,

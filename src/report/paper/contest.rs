@@ -124,12 +124,15 @@ fn table(contests: &[Contest; 2]) -> String {
 fn verdict(contest: &Contest) -> String {
     let order = Order::of(contest);
     format!(
-        "With the same law the paper's filter, told the true start, has a lower mean time than every vector law {by_law}, by {least:.1} to \
-         {most:.1} % of its own; start by start a vector law is faster in {beaten} of {pairs} pairs. Across laws it is not always first: \
+        "With the same law the paper's filter, told the true start, has a lower mean time than every vector law{astray} {by_law}, by {range} \
+         of its own; start by start a vector law is faster in {beaten} of {pairs} pairs. Across laws it is not always first: \
          {across}. Told nothing, it does not come home. The anchored filter, told nothing, {anchored}.\n",
-        by_law = if order.least_percent >= 0.0 { "under either law" } else { "under one law only" },
-        least = order.least_percent,
-        most = order.most_percent,
+        astray = match order.astray {
+            0 => String::new(),
+            n => format!(" but {n} that do not come home from all four"),
+        },
+        by_law = if order.percent.is_none_or(|[least, _]| least >= 0.0) { "under either law" } else { "under one law only" },
+        range = range(order.percent),
         beaten = order.beaten,
         pairs = order.pairs,
         across = if order.across == 0 {
@@ -161,12 +164,19 @@ fn anchored(contest: &Contest) -> String {
     }
 }
 
+/// Two percentages.
+pub(super) fn range(percent: Option<[f64; 2]>) -> String {
+    percent.map_or_else(|| "- %".to_owned(), |[least, most]| format!("{least:.1} to {most:.1} %"))
+}
+
 /// The order of a contest in numbers.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Order {
-    /// Least and most by which a vector law's mean time exceeds that of the paper's filter, told the start, under the same law, percent.
-    pub least_percent: f64,
-    pub most_percent: f64,
+    /// Least and most by which a vector law's mean time exceeds that of the paper's filter, told the start, under the same law,
+    /// percent, of those that come home from all starts; none where none does.
+    pub percent: Option<[f64; 2]>,
+    /// Vector laws that do not.
+    pub astray: usize,
     /// Pairs of a vector law and a start in which it is faster than the paper's filter under the same law, and how many pairs.
     pub beaten: usize,
     pub pairs: usize,
@@ -178,21 +188,18 @@ pub(super) struct Order {
 
 impl Order {
     pub(super) fn of(contest: &Contest) -> Self {
-        let mut order = Self {
-            least_percent: f64::INFINITY,
-            most_percent: f64::NEG_INFINITY,
-            beaten: 0,
-            pairs: 0,
-            across: 0,
-            compasses: 0,
-        };
+        let mut order = Self { percent: None, astray: 0, beaten: 0, pairs: 0, across: 0, compasses: 0 };
         let ratio = |row: &Row| row.mean_ratio(&contest.straight_s).unwrap_or(f64::INFINITY);
         for row in contest.rows.iter().filter(|r| matches!(r.entrant, Entrant::Vector(..)) && r.objects == 3) {
             let law = row.entrant.law();
             let Some(paper) = contest.row(Entrant::Paper(law)) else { continue };
             let excess = 100.0 * (ratio(row) / ratio(paper) - 1.0);
-            order.least_percent = order.least_percent.min(excess);
-            order.most_percent = order.most_percent.max(excess);
+            if excess.is_finite() {
+                let [least, most] = order.percent.unwrap_or([excess; 2]);
+                order.percent = Some([excess.min(least), excess.max(most)]);
+            } else {
+                order.astray += 1;
+            }
             for (theirs, ours) in row.times_s.iter().zip(&paper.times_s) {
                 order.pairs += 1;
                 order.beaten += usize::from(theirs.unwrap_or(f64::INFINITY) < ours.unwrap_or(f64::INFINITY));
