@@ -102,21 +102,18 @@ pub struct Findings {
     pub codings_px: [u32; 2],
 }
 
-/// Measures. `frames` panoramas make a round; sets are written to `scratch` and removed again.
+/// Measures. `frames` panoramas make a round; sets are written to `scratch` and removed again. `watch` is told what is being
+/// measured, every few seconds.
 ///
 /// # Errors
-/// When the world cannot be rendered, or a set cannot be written.
+/// When the world cannot be rendered, or a set cannot be written; [`Error::Interrupted`] when `watch` breaks.
 pub fn measure(world: &World, frames: usize, scratch: &Path, watch: &dyn Fn(&str) -> ControlFlow<()>) -> Result<Findings> {
+    let go_on = |what: &str| if watch(what).is_break() { Err(Error::Interrupted) } else { Ok(()) };
     let mut rates = Vec::new();
     for (width, height) in SIZES {
-        if watch(&format!("{width}x{height}")).is_break() {
-            return Err(Error::Interrupted);
-        }
-        rates.extend(measure_size(world, (width, height), frames, scratch)?);
+        rates.extend(measure_size(world, (width, height), frames, scratch, &|| go_on(&format!("{width}x{height}")))?);
     }
-    if watch("codings").is_break() {
-        return Err(Error::Interrupted);
-    }
+    go_on("codings")?;
     let size = SIZES[SIZES.len() - 1];
     let codings = codings(&samples(world, world.projection_of_size(size.0, size.1))?);
     let processor = crate::study::render::processor();
@@ -146,7 +143,14 @@ fn request(frames: usize, size_px: (u32, u32), layout: Layout) -> Request {
     }
 }
 
-fn measure_size(world: &World, size: (u32, u32), frames: usize, scratch: &Path) -> Result<Vec<Rates>> {
+fn measure_size(
+    world: &World,
+    size: (u32, u32),
+    frames: usize,
+    scratch: &Path,
+    go_on: &dyn Fn() -> Result<()>,
+) -> Result<Vec<Rates>> {
+    go_on()?;
     let plan = Plan::new(world, request(frames, size, LAYOUTS[0]))?;
     let projection = plan.projection;
     let (scene, bodies) = (Scene::new(world)?, world.body_poses());
@@ -186,12 +190,16 @@ fn measure_size(world: &World, size: (u32, u32), frames: usize, scratch: &Path) 
     let mut rounds: [Vec<f64>; 4] = Default::default();
     let mut pipelines = LAYOUTS.map(|layout| (layout, Vec::new()));
     for round in 0..ROUNDS {
+        go_on()?;
         rounds[0].push(render()?);
+        go_on()?;
         rounds[1].push(encode()?);
         for (layout, rates) in &mut pipelines {
+            go_on()?;
             rates.push(pipeline(*layout, round)?);
         }
         rounds[2].push(one.install(render)?);
+        go_on()?;
         rounds[3].push(one.install(encode)?);
     }
     let median = |rates: Vec<f64>| quantile(&rates, 0.5).unwrap_or(f64::NAN);
