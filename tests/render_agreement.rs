@@ -101,6 +101,23 @@ fn forest() -> String {
     text
 }
 
+/// More bodies behind one another than a column keeps, each higher than the one before, listed from far to near and mixed.
+fn queue() -> String {
+    let mut text = "name = \"queue\"\nhome = { x_m = 0, y_m = 0 }\n[room]\n\
+        outline_m = [[-1, -1], [9, -1], [9, 1], [-1, 1]]\nheight_m = 4\n"
+        .to_owned();
+    for k in 0..30 {
+        let place = (k * 17) % 30;
+        text += &format!(
+            "[[landmarks]]\nname = \"b{k}\"\nshape = {{ box = {{ size_m = [0.1, 1.5] }} }}\n\
+             texture = {{ family = \"brick\" }}\nposition_m = [{}, 0]\nheight_m = {}\n",
+            1.0 + 0.25 * f64::from(place),
+            0.35 + 0.09 * f64::from(place)
+        );
+    }
+    text
+}
+
 /// The one device of this process: making several at once has crashed drivers.
 fn device() -> Option<MutexGuard<'static, GpuRenderer>> {
     static DEVICE: OnceLock<Option<Mutex<GpuRenderer>>> = OnceLock::new();
@@ -182,7 +199,7 @@ fn gpu_and_cpu_agree() {
     let (mut worst, mut total, mut pictures) = ((0.0_f64, 0.0_f64), (0.0, 0.0), 0.0);
     let (mut bytes, mut unequal) = (0, 0);
     let builtin = World::builtin_names().into_iter().map(|name| World::open(name).unwrap());
-    for world in builtin.chain([text(CELLAR), text(&forest())]) {
+    for world in builtin.chain([text(CELLAR), text(&forest()), text(&queue())]) {
         let name = world.spec.name.clone();
         let scene = Scene::new(&world).unwrap();
         for k in 0..LightPreset::ALL.len() * CameraPreset::ALL.len() {
@@ -237,8 +254,9 @@ fn a_picture_beyond_the_device_is_refused() {
     let world = World::from_toml(CELLAR, "test").unwrap();
     let scene = Scene::new(&world).unwrap();
     let bodies = world.body_poses();
-    let projection = Projection::new(1 << 23, 2);
-    let view = View { projection, robot: world.home, bodies: &bodies };
-    let message = gpu.render(&scene, &view, &mut Panorama::black(Projection::new(4, 4))).unwrap_err().to_string();
-    assert!(message.contains("panorama size: found 8388608 x 2"), "{message}");
+    for (width, height, expected) in [(1 << 23, 2, "panorama size: found 8388608 x 2"), (2, 4097, "found 4097 rows")] {
+        let view = View { projection: Projection::new(width, height), robot: world.home, bodies: &bodies };
+        let message = gpu.render(&scene, &view, &mut Panorama::black(Projection::new(4, 4))).unwrap_err().to_string();
+        assert!(message.contains(expected), "{message}");
+    }
 }

@@ -118,6 +118,18 @@ pub(super) struct Params {
     pub corner_shade: f32,
     /// Inverse of how far that reaches, 1/m.
     pub inverse_reach: f32,
+    /// Row of the horizon.
+    pub horizon_row: f32,
+    /// The rows that can meet the ceiling are those before this one, ...
+    pub ceiling_end: u32,
+    /// ... and those that can meet the floor begin with this one.
+    pub floor_start: u32,
+    /// Where the shader finds the first edge, body and lamp in its table, which begins with this; in units of 16 bytes.
+    pub first_edge: u32,
+    pub first_body: u32,
+    pub first_lamp: u32,
+    /// Fills up to a multiple of 16 bytes.
+    pub padding: [u32; 2],
 }
 
 /// All tables of one view. Kept by a renderer and refilled view by view without allocating.
@@ -180,6 +192,10 @@ impl Frame {
             self.push_body(pane, scene.factors.windows, &Pose::IDENTITY, camera);
         }
         self.fill_lamps(scene, camera);
+        let texels = |bytes: usize| bytes.div_ceil(16) as u32;
+        let first_edge = texels(size_of::<Params>());
+        let first_body = first_edge + texels(size_of_val(self.edges.as_slice()));
+        let first_lamp = first_body + texels(size_of_val(self.bodies.as_slice()));
         self.params = Params {
             width: projection.width,
             height: projection.height,
@@ -196,6 +212,13 @@ impl Frame {
             pane_count: (self.lamps.len() - self.lamp_count) as u32,
             corner_shade: scene.light.corner_shade as f32,
             inverse_reach: (1.0 / scene.light.corner_reach_m) as f32,
+            horizon_row: projection.horizon_row as f32,
+            ceiling_end: self.rows.partition_point(|r| r.tan >= 0.0 && r.plane < FAR) as u32,
+            floor_start: self.rows.partition_point(|r| r.tan >= 0.0 || r.plane >= FAR) as u32,
+            first_edge,
+            first_body,
+            first_lamp,
+            padding: [0; 2],
         };
         Ok(())
     }

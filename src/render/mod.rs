@@ -99,9 +99,9 @@ pub trait Renderer: Send {
     /// do with them as it likes, for instance develop them by a camera.
     ///
     /// While `sink` works on one group of pictures the next one is rendered. At most two groups are in memory, whatever the length
-    /// of the batch: together two to 32 pictures for each thread of the pool, the fewer the larger they are. A GPU holds three
-    /// more, twice each. Each view has its own poses of
-    /// robot and bodies, so that a batch may be a film of moving bodies.
+    /// of the batch: together two to 32 pictures for each thread of the pool, the fewer the larger they are. A graphics adapter holds
+    /// three more, twice each on hardware. Each view has its own poses of robot and bodies, so that a batch may be a film of
+    /// moving bodies.
     ///
     /// ```
     /// use wayhome::geometry::Pose;
