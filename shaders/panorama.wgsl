@@ -4,20 +4,24 @@
 // software adapter computes some columns at once, and both branches of whatever is not a loop: what is only computed for sides
 // or only for horizontal faces therefore stands in loops of their own, which end when no column is left in them.
 
-// For all pixels in rows from the top: red, green, blue and a code for the instance, from the lowest byte up, and range (the bits
-// of f32). After them for each column the instances of its hits, nearest first, which are the codes from FIRST_HIT_CODE on:
-// two in each word.
-@group(0) @binding(5) var<storage, read_write> picture: array<vec2<u32>>;
+// For all pixels in rows from the top: red, green and blue from the lowest byte up, and the code of what is seen there. After
+// them for each column three words for each of its hits, nearest first, in which the codes are explained: instance, distance of
+// the side and height of the top or underside over the camera. A pixel's range follows from these and its row.
+@group(0) @binding(5) var<storage, read_write> picture: array<u32>;
 
-fn show(row: u32, column: u32, colour: u32, range: f32, code: u32) {
-    picture[row * params.width + column] = vec2<u32>((colour & 0xffffffu) | (code << 24u), bitcast<u32>(range));
+fn show(row: u32, column: u32, colour: u32, code: u32) {
+    let word = (colour & 0xffffffu) | (code << 24u);
+    // The minimum changes nothing, but a software adapter would put the word together lane by lane.
+    picture[row * params.width + column] = min(word, params.all_bits);
 }
 
 fn show_hits(column: u32) {
-    let first = params.width * params.height + column * (MAX_HITS / 4u);
-    for (var k = 0u; k < hit_count; k += 4u) {
-        let low = (hit_surface[k] + 1u) | ((hit_surface[k + 1u] + 1u) << 16u);
-        picture[first + k / 4u] = vec2<u32>(low, (hit_surface[k + 2u] + 1u) | ((hit_surface[k + 3u] + 1u) << 16u));
+    var place = params.width * params.height + column * 3u * MAX_HITS;
+    for (var k = 0u; k < hit_count; k++) {
+        picture[place] = hit_surface[k] + 1u;
+        picture[place + 1u] = bitcast<u32>(hit_near[k]);
+        picture[place + 2u] = bitcast<u32>(cap_height[k]);
+        place += 3u;
     }
 }
 
@@ -44,7 +48,7 @@ fn render(@builtin(global_invocation_id) id: vec3<u32>) {
             let side = new_side(hit_again(span.surface, direction), direction);
             while r < end {
                 let row = rows[r];
-                show(r, column, shade_side(side, r, row), side.near * row.stretch, span.code);
+                show(r, column, shade_side(side, r, row), span.code);
                 r++;
             }
         } else if span.surface != NOTHING {
@@ -52,12 +56,12 @@ fn render(@builtin(global_invocation_id) id: vec3<u32>) {
             while r < end {
                 let row = rows[r];
                 let t = span.height * row.inverse_tan + span.room * row.plane;
-                show(r, column, shade_plane(plane, direction, t, row), t * row.stretch, span.code);
+                show(r, column, shade_plane(plane, direction, t, row), span.code);
                 r++;
             }
         } else {
             while r < end {
-                show(r, column, 0u, 0.0, span.code);
+                show(r, column, 0u, span.code);
                 r++;
             }
         }

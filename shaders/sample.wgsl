@@ -24,13 +24,13 @@ struct Material {
 }
 
 // Per surface tiles per metre, number of the last level and a word of padding, and the levels.
-@group(0) @binding(3) var materials: texture_2d<u32>;
+@group(0) @binding(3) var materials: texture_storage_2d<rg32uint, read>;
 // Columns of tiles, one beside the other: what is near one another in a texture lies on few pages of memory. Each texel comes
 // with the next one along v, since no sample needs one alone.
-@group(0) @binding(4) var atlas: texture_2d_array<u32>;
+@group(0) @binding(4) var atlas: texture_storage_2d_array<rg32uint, read>;
 
 fn material_words(k: u32) -> vec2<u32> {
-    return textureLoad(materials, vec2<u32>(k & 1023u, k >> 10u), 0).xy;
+    return textureLoad(materials, vec2<u32>(k & 1023u, k >> 10u)).xy;
 }
 
 fn material_at(surface: u32) -> Material {
@@ -55,7 +55,7 @@ fn line_at(level: MipLevel, u: i32) -> Line {
 fn texels(line: Line, v: i32) -> vec2<u32> {
     let place = u32(v + 1);
     let tile = line.tile + (place >> 5u);
-    return textureLoad(atlas, vec2<u32>(place & 31u, ((tile & 255u) << 5u) | line.u), tile >> 8u, 0).xy;
+    return textureLoad(atlas, vec2<u32>(place & 31u, ((tile & 255u) << 5u) | line.u), tile >> 8u).xy;
 }
 
 fn round_small(x: f32) -> i32 {

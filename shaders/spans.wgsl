@@ -8,6 +8,7 @@ const NOTHING: u32 = 0xffffu;
 const NOTHING_CODE: u32 = 0u;
 const FLOOR_CODE: u32 = 1u;
 const CEILING_CODE: u32 = 2u;
+// Of the side of the first hit; that of its top or underside follows, then those of the next hit.
 const FIRST_HIT_CODE: u32 = 3u;
 
 // For each hit the rows, from the first to before the last, that would see its side if nothing else were there, and those that
@@ -88,6 +89,7 @@ fn find_faces() {
         past = far;
         side_rows[k] = rows_before_planes(near);
         cap_rows[k] = vec2<u32>(0u);
+        cap_height[k] = 0.0;
         if hit_surface[k] < 2u + params.wall_count {
             continue;
         }
@@ -149,7 +151,7 @@ fn span_at(row: u32) -> Span {
         let at = near + height * here.inverse_tan;
         if at < distance {
             distance = at;
-            span = Span(span.end, hit_surface[k], face, near, height, 0.0, FIRST_HIT_CODE + k);
+            span = Span(span.end, hit_surface[k], face, near, height, 0.0, FIRST_HIT_CODE + 2u * k + select(1u, 0u, sees_side));
         }
     }
     if hits_overlap && faces > 1u {

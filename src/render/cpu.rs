@@ -12,8 +12,9 @@ use std::sync::{Mutex, PoisonError};
 use rayon::prelude::*;
 
 use super::columns::Face;
-use super::frame::{FAR, Frame, Row};
+use super::frame::Frame;
 use super::hits::ColumnHits;
+use super::now::{Now, Shown};
 use super::sample::{LANES, POINTS, PointRoom, RUN};
 use super::shade::{Plane, Side, SideRoom, Sight};
 use super::spans::{NOTHING, Spans};
@@ -210,20 +211,7 @@ struct Change {
     next: u32,
     /// Column of the tile.
     column: u16,
-    instance: u16,
-    /// Distance is `near`, and `height` times the inverse tangent of the row, and `room` times the distance of floor or ceiling.
-    near: f32,
-    height: f32,
-    room: f32,
-}
-
-/// What the columns of a tile show in a row; see [`Change`].
-#[derive(Debug, Default)]
-struct Now {
-    near: Vec<f32>,
-    height: Vec<f32>,
-    room: Vec<f32>,
-    instance: Vec<u16>,
+    shown: Shown,
 }
 
 /// A horizontal surface that some columns of a group see, and the rows in which they may.
@@ -244,11 +232,7 @@ impl Desk {
         self.changes.clear();
         self.first_change.clear();
         self.first_change.resize(rows, 0);
-        let now = &mut self.now;
-        for values in [&mut now.near, &mut now.height, &mut now.room] {
-            values.resize(columns, 0.0);
-        }
-        now.instance.resize(columns, 0);
+        self.now.resize(columns);
     }
 
     /// Puts the columns that were worked on into the rows, from column `first` of the tile on.
@@ -354,15 +338,15 @@ fn lay_out<'a>(band: &Band<'a>, desk: &mut Desk, rows: usize, column: usize, fir
             continue;
         }
         let hit = hits.get(usize::from(span.hit));
-        let (mut near, mut height, mut room) = (0.0, 0.0, 0.0);
+        let mut shown = Shown { instance: (span.surface + 1) as u16, ..Shown::default() };
         match (span.face, hit) {
-            (Face::Side, Some(hit)) => near = hit.near,
-            (Face::Top, Some(hit)) => height = hit.top - eye,
-            (Face::Underside, Some(hit)) => height = hit.bottom - eye,
-            (_, None) => room = 1.0,
+            (Face::Side, Some(hit)) => shown.near = hit.near,
+            (Face::Top, Some(hit)) => shown.height = hit.top - eye,
+            (Face::Underside, Some(hit)) => shown.height = hit.bottom - eye,
+            (_, None) => shown.room = 1.0,
         }
-        let (next, instance) = (desk.first_change[start], (span.surface + 1) as u16);
-        desk.changes.push(Change { next, column: (column - first) as u16, instance, near, height, room });
+        let next = desk.first_change[start];
+        desk.changes.push(Change { next, column: (column - first) as u16, shown });
         desk.first_change[start] = desk.changes.len() as u32;
         let count = end - start;
         match (span.face, hit) {
@@ -403,26 +387,12 @@ fn show_row(band: &mut Band<'_>, desk: &mut Desk, number: usize, columns: Range<
     let now = &mut desk.now;
     let mut next = desk.first_change[number] as usize;
     while let Some(change) = next.checked_sub(1).and_then(|k| desk.changes.get(k)) {
-        let column = usize::from(change.column);
-        (now.near[column], now.height[column], now.room[column]) = (change.near, change.height, change.room);
-        now.instance[column] = change.instance;
+        now.set(usize::from(change.column), change.shown);
         next = change.next as usize;
     }
     let start = frame.params.width as usize * number + columns.start;
     let places = start..start + columns.len();
     let colours = &desk.colours[number * desk.stride..][..columns.len()];
     band.rgba[4 * places.start..4 * places.end].copy_from_slice(bytemuck::cast_slice(colours));
-    band.instance[places.clone()].copy_from_slice(&now.instance);
-    show_ranges(*row, now, &mut band.range[places]);
-}
-
-/// The ranges of a row.
-#[inline(always)]
-fn show_ranges(row: Row, now: &Now, out: &mut [f32]) {
-    let count = out.len();
-    let (near, height, room) = (&now.near[..count], &now.height[..count], &now.room[..count]);
-    for k in 0..count {
-        let distance = near[k] + height[k] * row.inverse_tan + room[k] * row.plane;
-        out[k] = if distance < FAR { distance * row.stretch } else { 0.0 };
-    }
+    now.show(*row, &mut band.instance[places.clone()], &mut band.range[places]);
 }

@@ -128,8 +128,10 @@ pub(super) struct Params {
     pub first_edge: u32,
     pub first_body: u32,
     pub first_lamp: u32,
+    /// No word is greater than this; the shader's compiler must not know.
+    pub all_bits: u32,
     /// Fills up to a multiple of 16 bytes.
-    pub padding: [u32; 2],
+    pub padding: u32,
 }
 
 /// All tables of one view. Kept by a renderer and refilled view by view without allocating.
@@ -218,7 +220,8 @@ impl Frame {
             first_edge,
             first_body,
             first_lamp,
-            padding: [0; 2],
+            all_bits: u32::MAX,
+            padding: 0,
         };
         Ok(())
     }

@@ -26,6 +26,7 @@ mod gpu;
 mod hits;
 mod huge_pages;
 mod instructions;
+mod now;
 mod sample;
 mod scene;
 mod shade;

@@ -21,6 +21,11 @@ pub const SHADER: &str = concat!(
     include_str!("../../../shaders/panorama.wgsl"),
 );
 
+/// Formats of the tables that the shader reads as textures.
+pub(super) const TABLES: wgpu::TextureFormat = wgpu::TextureFormat::Rgba32Uint;
+pub(super) const MATERIALS: wgpu::TextureFormat = wgpu::TextureFormat::Rg32Uint;
+pub(super) const ATLAS: wgpu::TextureFormat = wgpu::TextureFormat::Rg32Uint;
+
 /// What the process has of graphics: making several devices at once has crashed drivers, so that all renderers share one.
 static SHARED: Mutex<Option<Arc<Shared>>> = Mutex::new(None);
 
@@ -134,19 +139,19 @@ impl Shared {
         let entry =
             |binding: u32, ty| wgpu::BindGroupLayoutEntry { binding, visibility: wgpu::ShaderStages::COMPUTE, ty, count: None };
         let buffer = |ty| wgpu::BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None };
-        let texture = |view_dimension| wgpu::BindingType::Texture {
-            sample_type: wgpu::TextureSampleType::Uint,
+        let table = |view_dimension, format| wgpu::BindingType::StorageTexture {
+            access: wgpu::StorageTextureAccess::ReadOnly,
+            format,
             view_dimension,
-            multisampled: false,
         };
         let bindings = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
             label: Some("panorama"),
             entries: &[
-                entry(0, texture(wgpu::TextureViewDimension::D2)),
+                entry(0, table(wgpu::TextureViewDimension::D2, TABLES)),
                 entry(1, buffer(wgpu::BufferBindingType::Storage { read_only: true })),
                 entry(2, buffer(wgpu::BufferBindingType::Uniform)),
-                entry(3, texture(wgpu::TextureViewDimension::D2)),
-                entry(4, texture(wgpu::TextureViewDimension::D2Array)),
+                entry(3, table(wgpu::TextureViewDimension::D2, MATERIALS)),
+                entry(4, table(wgpu::TextureViewDimension::D2Array, ATLAS)),
                 entry(5, buffer(wgpu::BufferBindingType::Storage { read_only: false })),
             ],
         });

@@ -10,8 +10,8 @@ use std::sync::{Arc, mpsc};
 use std::time::Duration;
 
 pub use device::SHADER;
-use device::{Shared, Variant};
-use picture::{Codes, PIXEL_BYTES, bytes_of, unpack};
+use device::{ATLAS, MATERIALS, Shared, TABLES, Variant};
+use picture::{PIXEL_BYTES, Unpacker, bytes_of};
 use tables::{Table, Texels};
 use tiles::{LAYER_TILES, TILE, tile};
 
@@ -49,7 +49,7 @@ pub struct GpuRenderer {
     words: Vec<u8>,
     materials: Texels,
     atlas: Texels,
-    codes: Codes,
+    unpacker: Unpacker,
     /// Whose materials and atlas they are.
     scene: Option<u64>,
     /// Places for pictures under way, used in turn.
@@ -80,6 +80,7 @@ struct Under {
     submission: wgpu::SubmissionIndex,
     arrived: mpsc::Receiver<std::result::Result<(), wgpu::BufferAsyncError>>,
     bytes: u64,
+    rows: Vec<Row>,
 }
 
 impl GpuRenderer {
@@ -110,11 +111,11 @@ impl GpuRenderer {
             frame: Frame::new(),
             directions: Table::new("directions", wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST),
             rows: Table::new("rows", wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST),
-            tables: Texels::new("tables", wgpu::TextureFormat::Rgba32Uint, [TABLE_WIDTH, 1]),
+            tables: Texels::new("tables", TABLES, [TABLE_WIDTH, 1]),
             words: Vec::new(),
-            materials: Texels::new("materials", wgpu::TextureFormat::Rg32Uint, [TABLE_WIDTH, 1]),
-            atlas: Texels::new("atlas", wgpu::TextureFormat::Rg32Uint, [TILE as u32, (TILE * LAYER_TILES) as u32]),
-            codes: Vec::new(),
+            materials: Texels::new("materials", MATERIALS, [TABLE_WIDTH, 1]),
+            atlas: Texels::new("atlas", ATLAS, [TILE as u32, (TILE * LAYER_TILES) as u32]),
+            unpacker: Unpacker::default(),
             scene: None,
             slots: Self::slots(reads_in_place),
         }
@@ -236,7 +237,7 @@ impl GpuRenderer {
             // The receiver is gone only when waiting has failed already.
             let _ = send.send(result);
         });
-        Ok(Under { submission, arrived, bytes })
+        Ok(Under { submission, arrived, bytes, rows: self.frame.rows.clone() })
     }
 
     /// Waits for a picture and copies it.
@@ -251,7 +252,7 @@ impl GpuRenderer {
         {
             let mapped = readback.get_mapped_range(0..under.bytes).map_err(|e| gpu_error(&e))?;
             out.reshape(view.projection)?;
-            unpack(&mapped, &mut self.codes, out)?;
+            self.unpacker.unpack(&mapped, &under.rows, out)?;
         }
         readback.unmap();
         Ok(())
