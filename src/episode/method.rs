@@ -170,7 +170,7 @@ pub fn build(
 /// Home counts as reached within this share of the arrival radius, by the estimate.
 const STOP_SHARE: f64 = 0.25;
 /// ... or so near that braking at once ends there, within this share of the arrival radius ...
-const ROLL_SHARE: f64 = 0.5;
+const ROLL_SHARE: f64 = 0.8;
 /// ... if the position's standard deviation is within this share of the arrival radius.
 const STOP_SD_SHARE: f64 = 0.4;
 /// ... and the bearings of this many steps in a row bear it out.
