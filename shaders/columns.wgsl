@@ -1,4 +1,5 @@
-// What the rays of a column meet: walls and bodies, nearest first. The twin of src/render/columns.rs, function by function.
+// What the rays of a column meet: walls and bodies, nearest first. The twin of src/render/columns.rs and,
+// for the list of hits, src/render/hits.rs.
 //
 // Tables are storage textures, or a uniform buffer: a software adapter reads these in vectors. Storage buffers it reads lane by
 // lane, and sampled textures through a function that costs twice as much.
@@ -122,7 +123,6 @@ struct Hit {
     near: f32,
     far: f32,
     bottom: f32,
-    top: f32,
     normal: vec2<f32>,
     u: f32,
     surface: u32,
@@ -136,7 +136,7 @@ var<private> hit_surface: array<u32, MAX_HITS>;
 var<private> hit_count: u32;
 
 fn none() -> Hit {
-    return Hit(FAR, FAR, -FAR, FAR, vec2<f32>(0.0), 0.0, 0u);
+    return Hit(FAR, FAR, -FAR, vec2<f32>(0.0), 0.0, 0u);
 }
 
 // A hit whose near is FAR is no hit.
@@ -170,7 +170,6 @@ fn hit_body(k: u32, direction: vec2<f32>) -> Hit {
     }
     hit.near = max(hit.near, 0.0);
     hit.bottom = body.bottom;
-    hit.top = body.top;
     hit.surface = 2u + params.wall_count + k;
     return hit;
 }
@@ -280,8 +279,9 @@ fn insert_hit(near: f32, far: f32, surface: u32) {
     if hit_count == MAX_HITS - 1u {
         var farthest = near;
         for (var k = 0u; k < hit_count; k++) {
-            // Of equally far ones the last.
-            if hit_near[k] > near && hit_near[k] >= farthest {
+            // Of equally far ones that with the greatest number.
+            let as_far = place < hit_count && hit_near[k] == farthest && hit_surface[k] > hit_surface[place];
+            if hit_near[k] > farthest || as_far {
                 farthest = hit_near[k];
                 place = k;
             }

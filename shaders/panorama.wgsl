@@ -10,7 +10,7 @@
 @group(0) @binding(5) var<storage, read_write> picture: array<u32>;
 
 fn show(row: u32, column: u32, colour: u32, code: u32) {
-    let word = (colour & 0xffffffu) | (code << 24u);
+    let word = colour | (code << 24u);
     // The minimum changes nothing, but a software adapter would put the word together lane by lane.
     picture[row * params.width + column] = min(word, params.all_bits);
 }
@@ -45,7 +45,11 @@ fn render(@builtin(global_invocation_id) id: vec3<u32>) {
         let end = min(span.end, last);
         let is_side = span.face == SIDE && span.surface != NOTHING;
         if is_side {
-            let side = new_side(hit_again(span.surface, direction), direction);
+            var hit = hit_again(span.surface, direction);
+            // Computed again it may be a little off, and at an outline miss.
+            hit.near = span.near;
+            hit.surface = span.surface;
+            let side = new_side(hit, direction);
             while r < end {
                 let row = rows[r];
                 show(r, column, shade_side(side, r, row), span.code);

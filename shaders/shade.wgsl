@@ -61,12 +61,12 @@ fn glow_of(surface: u32) -> f32 {
     return body_at(surface - 2u - params.wall_count).glow;
 }
 
-// Colour times light, packed with red in the lowest byte; opaque. Light is rounded to 1/4096, at most 16.
+// Colour times light, packed with red in the lowest byte. Light is rounded to 1/4096, at most 16.
 fn light_up(colour: Colour, light: f32) -> u32 {
     let factor = u32(round_small(min(light * 4096.0, 65535.0)));
     let red = channel_lit(colour.red_blue & 0xffffu, factor);
     let blue = channel_lit(colour.red_blue >> 16u, factor);
-    return red | (channel_lit(colour.green, factor) << 8u) | (blue << 16u) | 0xff000000u;
+    return red | (channel_lit(colour.green, factor) << 8u) | (blue << 16u);
 }
 
 fn channel_lit(channel: u32, factor: u32) -> u32 {

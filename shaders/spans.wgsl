@@ -20,7 +20,7 @@ var<private> cap_height: array<f32, MAX_HITS>;
 var<private> hits_overlap: bool;
 
 // Rows up to `end` that show the same face of a surface. Its horizontal distance is `near`, and `height` times the inverse
-// tangent of the row, and `room` times the distance of floor or ceiling.
+// tangent of the row, and `room` times the distance of floor or ceiling. `code` stands for it in the picture.
 struct Span {
     end: u32,
     surface: u32,
@@ -28,7 +28,6 @@ struct Span {
     near: f32,
     height: f32,
     room: f32,
-    // What stands for the surface in the picture; see there.
     code: u32,
 }
 
@@ -149,7 +148,8 @@ fn span_at(row: u32) -> Span {
             face = select(UNDERSIDE, TOP, height < 0.0);
         }
         let at = near + height * here.inverse_tan;
-        if at < distance {
+        // Where none overlap the first hides the others as a whole, whatever rounding makes of the row at its edge.
+        if select(faces == 1u, at < distance, hits_overlap) {
             distance = at;
             span = Span(span.end, hit_surface[k], face, near, height, 0.0, FIRST_HIT_CODE + 2u * k + select(1u, 0u, sees_side));
         }

@@ -15,7 +15,7 @@ use crate::world::Footprint;
 /// Distance that stands for "never", m. Finite, because shaders may assume that no infinities occur.
 pub(super) const FAR: f32 = 1.0e9;
 
-/// One edge of the outline or of a polygonal footprint. The layout is that of `Edge` in `shaders/columns.wgsl`.
+/// One edge of the outline or of a polygonal footprint. `edge_at` of `shaders/columns.wgsl` reads it.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 pub(super) struct Edge {
@@ -33,7 +33,7 @@ pub(super) struct Edge {
     pub length: f32,
 }
 
-/// A body where it stands now. The layout is that of `Body` in `shaders/columns.wgsl`.
+/// A body where it stands now. `body_at` of `shaders/columns.wgsl` reads it.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 pub(super) struct Body {
@@ -57,7 +57,7 @@ pub(super) struct Body {
     pub padding: [u32; 2],
 }
 
-/// A lamp, or a piece of a window. The layout is that of `Lamp` in `shaders/shade.wgsl`.
+/// A lamp, or a piece of a window. `lamp_at` of `shaders/shade.wgsl` reads it.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 pub(super) struct Lamp {
@@ -89,7 +89,8 @@ pub(super) struct Row {
     pub plane: f32,
 }
 
-/// Numbers of the whole view. The layout is that of `Params` in `shaders/columns.wgsl`.
+/// Numbers of the whole view. The layout is that of `Params` in `shaders/columns.wgsl`,
+/// where `load_params` reads it.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 pub(super) struct Params {
@@ -299,7 +300,8 @@ impl Frame {
         self.rows.clear();
         self.rows.extend((0..projection.height).map(|row| {
             let tan = projection.tan_elevation(f64::from(row));
-            let inverse = if tan.abs() * far > 1.0 { 1.0 / tan } else { far };
+            let sign = if tan < 0.0 { -1.0 } else { 1.0 };
+            let inverse = if tan.abs() * far > 1.0 { 1.0 / tan } else { sign * far };
             let plane = (if tan < 0.0 { below } else { above }) * inverse;
             Row {
                 tan: tan as f32,

@@ -61,7 +61,8 @@ impl ColumnHits {
         }
         let bodies = count - usize::from(wall);
         let place = hits[..bodies].partition_point(|h| h.near <= hit.near);
-        if count == MAX_HITS {
+        // One place is kept for the wall.
+        if bodies == MAX_HITS - 1 {
             if place >= bodies {
                 return;
             }

@@ -17,7 +17,8 @@ use crate::world::{Body, Footprint, LightPreset, Pattern, Texture, Window, World
 /// Most levels of a texture.
 pub(super) const LEVELS: usize = texture::FINEST as usize + 1;
 
-/// Where a surface's texture lies in the atlas. The layout is that of `Material` in `shaders/sample.wgsl`.
+/// Where a surface's texture lies in the atlas. `material_at` of `shaders/sample.wgsl`
+/// reads it.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 pub(super) struct Material {
@@ -34,7 +35,7 @@ pub(super) struct Material {
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 pub(super) struct MipLevel {
-    /// Index in the atlas of the first texel of the border.
+    /// Index in the atlas of the first texel of the border; on a graphics device the number of its first tile.
     pub base: u32,
     /// Texels along an edge, the border not counted.
     pub size: u32,

@@ -163,6 +163,8 @@ impl Shared {
         let pipelines = Mutex::default();
         let shared =
             Self { info, software, device, queue, reads_in_place, module, bindings, layout, pipelines, complaints, lost };
+        // So that a driver that does not take the shader says so now.
+        shared.pipeline(Variant { equal_angle: false, lamps_shine: true, corners_are_dark: false });
         shared.check()?;
         Ok(shared)
     }

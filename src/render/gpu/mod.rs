@@ -50,6 +50,8 @@ pub struct GpuRenderer {
     materials: Texels,
     atlas: Texels,
     unpacker: Unpacker,
+    /// Most rows of an invocation.
+    invocation_rows: u32,
     /// Whose materials and atlas they are.
     scene: Option<u64>,
     /// Places for pictures under way, used in turn.
@@ -106,8 +108,10 @@ impl GpuRenderer {
 
     fn on(shared: Arc<Shared>) -> Self {
         let reads_in_place = shared.reads_in_place;
+        let invocation_rows = if shared.software { u32::MAX } else { HARDWARE_ROWS };
         Self {
             shared,
+            invocation_rows,
             frame: Frame::new(),
             directions: Table::new("directions", wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST),
             rows: Table::new("rows", wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST),
@@ -127,9 +131,12 @@ impl GpuRenderer {
         let most = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
         let p = &view.projection;
         let bytes = bytes_of(p);
+        let (of_columns, pixels) = (bytes - p.pixels() as u64 * PIXEL_BYTES, most / PIXEL_BYTES);
+        let pixels = pixels.saturating_sub(of_columns / PIXEL_BYTES);
         let columns = limits.max_compute_workgroups_per_dimension.saturating_mul(WORKGROUP);
         if bytes > most || p.width > columns {
-            let allowed = format!("up to {} pixels and {columns} columns on {}", most / PIXEL_BYTES, self.shared.info.adapter);
+            let adapter = &self.shared.info.adapter;
+            let allowed = format!("up to {pixels} pixels in that many columns, and {columns} columns, on {adapter}");
             let found = format!("{} x {} = {} pixels", p.width, p.height, p.pixels());
             return Err(Error::Invalid { what: "panorama size".to_owned(), found, allowed });
         }
@@ -145,7 +152,7 @@ impl GpuRenderer {
         let (device, queue, frame) = (&self.shared.device, &self.shared.queue, &self.frame);
         let mut moved = false;
         moved |= self.directions.write(device, queue, bytemuck::cast_slice(&frame.directions));
-        self.rows.reserve(device, u64::from(MAX_ROWS) * size_of::<Row>() as u64);
+        moved |= self.rows.reserve(device, u64::from(MAX_ROWS) * size_of::<Row>() as u64);
         moved |= self.rows.write(device, queue, bytemuck::cast_slice(&frame.rows));
         self.words.clear();
         self.words.extend_from_slice(bytemuck::bytes_of(&frame.params));
@@ -210,9 +217,7 @@ impl GpuRenderer {
         self.shared.check()?;
         self.check_size(view)?;
         self.frame.prepare(scene, view)?;
-        if !self.shared.software {
-            self.frame.params.rows_per_invocation = HARDWARE_ROWS.min(view.projection.height);
-        }
+        self.frame.params.rows_per_invocation = self.invocation_rows.min(view.projection.height);
         let bytes = bytes_of(&view.projection);
         self.upload(scene)?;
         let p = self.frame.params;
@@ -311,6 +316,23 @@ impl Renderer for GpuRenderer {
 mod tests {
     use super::*;
     use crate::world::World;
+
+    /// What hardware renders: columns in pieces, which cut spans anywhere.
+    #[test]
+    fn pieces_of_columns_are_the_same_picture() {
+        let Ok(mut whole) = GpuRenderer::new() else { return };
+        let mut pieces = GpuRenderer::new().unwrap();
+        (whole.invocation_rows, pieces.invocation_rows) = (u32::MAX, 7);
+        for name in ["crowd", "gallery", "proving-ground"] {
+            let world = World::open(name).unwrap();
+            let (scene, bodies) = (Scene::new(&world).unwrap(), world.body_poses());
+            let view = View { projection: world.projection_of_size(500, 90), robot: world.home, bodies: &bodies };
+            let (mut a, mut b) = (Panorama::empty(), Panorama::empty());
+            whole.render(&scene, &view, &mut a).unwrap();
+            pieces.render(&scene, &view, &mut b).unwrap();
+            assert!(a == b, "{name}");
+        }
+    }
 
     #[test]
     fn a_device_lost_in_a_batch_is_an_error_and_the_next_renderer_works() {

@@ -17,13 +17,8 @@ impl Table {
     pub fn reserve(&mut self, device: &wgpu::Device, size: u64) -> bool {
         let enough = self.buffer.as_ref().is_some_and(|b| b.size() >= size);
         if !enough {
-            // Empty tables still need a buffer to bind, as long as their element.
-            let descriptor = wgpu::BufferDescriptor {
-                label: Some(self.label),
-                size: size.max(64),
-                usage: self.usage,
-                mapped_at_creation: false,
-            };
+            let descriptor =
+                wgpu::BufferDescriptor { label: Some(self.label), size, usage: self.usage, mapped_at_creation: false };
             self.buffer = Some(device.create_buffer(&descriptor));
         }
         !enough
@@ -31,7 +26,7 @@ impl Table {
 
     pub fn write(&mut self, device: &wgpu::Device, queue: &wgpu::Queue, bytes: &[u8]) -> bool {
         let moved = self.reserve(device, bytes.len() as u64);
-        if let (Some(buffer), false) = (&self.buffer, bytes.is_empty()) {
+        if let Some(buffer) = &self.buffer {
             queue.write_buffer(buffer, 0, bytes);
         }
         moved

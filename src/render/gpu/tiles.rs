@@ -3,7 +3,10 @@
 use std::collections::HashMap;
 
 use crate::render::Scene;
-use crate::render::scene::{Material, MipLevel};
+use crate::render::scene::{LEVELS, Material, MipLevel};
+
+// The shader counts a material's texels, of two words each: MATERIAL_TEXELS of `shaders/sample.wgsl`.
+const _: () = assert!(size_of::<Material>() == 8 * (2 + LEVELS) && LEVELS == 45);
 
 /// Texels along the edge of a tile, as the shader has them: two pages of memory.
 pub(super) const TILE: usize = 32;

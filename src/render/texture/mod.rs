@@ -33,7 +33,7 @@ pub(super) struct Baked {
 
 /// Levels an octave.
 const PER_OCTAVE: u32 = 4;
-/// Most texels of an atlas: 128 MiB, what every graphics device binds as one buffer.
+/// Most texels of an atlas: 128 MiB, and up to three times as much on a graphics device, where they lie in pairs and tiles.
 const ATLAS_TEXELS: usize = 32 << 20;
 /// A tile is made as fine as this, in metres a texel, ...
 const COARSEST_M: f64 = 0.008;
