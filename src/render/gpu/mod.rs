@@ -179,7 +179,7 @@ impl GpuRenderer {
         Ok(())
     }
 
-    /// The bindings of a slot with room for `bytes`, and its buffer to be read.
+    /// The bindings of a slot, in which room is made for `bytes`.
     fn bind(&mut self, slot: usize, bytes: u64) -> Result<&wgpu::BindGroup> {
         let Shared { device, reads_in_place, bindings: layout, .. } = &*self.shared;
         let place = &mut self.slots[slot];
@@ -190,7 +190,7 @@ impl GpuRenderer {
             place.bindings = None;
         }
         if place.bindings.is_none() {
-            let buffer = |table: &'_ Table| table.buffer.clone().ok_or_else(missing);
+            let buffer = |table: &Table| table.buffer.clone().ok_or_else(missing);
             let buffers = [buffer(&self.directions)?, buffer(&self.rows)?, buffer(&place.picture)?];
             let view = |texels: &Texels| texels.view().ok_or_else(missing);
             let textures = [view(&self.tables)?, view(&self.materials)?, view(&self.atlas)?];
@@ -245,7 +245,7 @@ impl GpuRenderer {
         Ok(Under { submission, arrived, bytes, rows: self.frame.rows.clone() })
     }
 
-    /// Waits for a picture and copies it.
+    /// Waits for a picture and unpacks it.
     fn finish(&mut self, under: Under, slot: usize, view: &View<'_>, out: &mut Panorama) -> Result<()> {
         let wait = wgpu::PollType::Wait { submission_index: Some(under.submission), timeout: Some(TIMEOUT) };
         let polled = self.shared.device.poll(wait);
@@ -314,12 +314,18 @@ impl Renderer for GpuRenderer {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::{Mutex, PoisonError};
+
     use super::*;
     use crate::world::World;
+
+    /// One test at a time: they share a device, and one of them destroys it.
+    static DEVICE: Mutex<()> = Mutex::new(());
 
     /// What hardware renders: columns in pieces, which cut spans anywhere.
     #[test]
     fn pieces_of_columns_are_the_same_picture() {
+        let _alone = DEVICE.lock().unwrap_or_else(PoisonError::into_inner);
         let Ok(mut whole) = GpuRenderer::new() else { return };
         let mut pieces = GpuRenderer::new().unwrap();
         (whole.invocation_rows, pieces.invocation_rows) = (u32::MAX, 7);
@@ -336,6 +342,7 @@ mod tests {
 
     #[test]
     fn a_device_lost_in_a_batch_is_an_error_and_the_next_renderer_works() {
+        let _alone = DEVICE.lock().unwrap_or_else(PoisonError::into_inner);
         let mut renderer = match GpuRenderer::new() {
             Ok(renderer) => renderer,
             Err(Error::NoAdapter(why)) => {
