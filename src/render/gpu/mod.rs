@@ -322,12 +322,24 @@ mod tests {
     /// One test at a time: they share a device, and one of them destroys it.
     static DEVICE: Mutex<()> = Mutex::new(());
 
+    /// A renderer; where there is no adapter this says so loudly, and fails if it must not be so.
+    fn renderer() -> Option<GpuRenderer> {
+        match GpuRenderer::new() {
+            Ok(renderer) => Some(renderer),
+            Err(Error::NoAdapter(why)) => {
+                eprintln!("\n*** NOT RUN: there is no graphics adapter ({why}) ***\n");
+                assert!(std::env::var("WAYHOME_REQUIRE_GPU").as_deref() != Ok("1"), "WAYHOME_REQUIRE_GPU is 1");
+                None
+            }
+            Err(error) => panic!("{error}"),
+        }
+    }
+
     /// What hardware renders: columns in pieces, which cut spans anywhere.
     #[test]
     fn pieces_of_columns_are_the_same_picture() {
         let _alone = DEVICE.lock().unwrap_or_else(PoisonError::into_inner);
-        let Ok(mut whole) = GpuRenderer::new() else { return };
-        let mut pieces = GpuRenderer::new().unwrap();
+        let (Some(mut whole), Some(mut pieces)) = (renderer(), renderer()) else { return };
         (whole.invocation_rows, pieces.invocation_rows) = (u32::MAX, 7);
         for name in ["crowd", "gallery", "proving-ground"] {
             let world = World::open(name).unwrap();
@@ -343,15 +355,7 @@ mod tests {
     #[test]
     fn a_device_lost_in_a_batch_is_an_error_and_the_next_renderer_works() {
         let _alone = DEVICE.lock().unwrap_or_else(PoisonError::into_inner);
-        let mut renderer = match GpuRenderer::new() {
-            Ok(renderer) => renderer,
-            Err(Error::NoAdapter(why)) => {
-                eprintln!("\n*** NOT RUN: there is no graphics adapter ({why}) ***\n");
-                assert!(std::env::var("WAYHOME_REQUIRE_GPU").as_deref() != Ok("1"), "WAYHOME_REQUIRE_GPU is 1");
-                return;
-            }
-            Err(error) => panic!("{error}"),
-        };
+        let Some(mut renderer) = renderer() else { return };
         let world = World::open("lab").unwrap();
         let scene = Scene::new(&world).unwrap();
         let (projection, bodies) = (world.projection_of_size(320, 40), world.body_poses());
