@@ -59,6 +59,8 @@ pub struct Observation<'a> {
 pub struct RobotSheet {
     /// Distance between the wheels, m.
     pub track_m: f64,
+    /// Position of the camera from the middle of the axle, forward and left, m. Bearings are those from there.
+    pub camera_offset_m: [f64; 2],
     /// Greatest forward speed, m/s.
     pub max_speed_m_s: f64,
     /// Greatest yaw rate, rad/s.

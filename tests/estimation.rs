@@ -76,6 +76,8 @@ struct Setting {
     carried: Option<(f64, Pose)>,
     /// Whether the wheels slip as they change speed, by as much as the filter expects.
     slips: bool,
+    /// The camera from the middle of the axle, forward and left, m.
+    camera_offset_m: [f64; 2],
 }
 
 fn uniform(stream: &mut wayhome::random::Stream) -> f64 {
@@ -101,10 +103,12 @@ fn trial(setting: &Setting, seed: u64) -> Trial {
     let distance = place.norm();
     let mut noise = seed.stream("noise");
     let sd = setting.bearing_sd_rad;
+    let mount = Pose::new(setting.camera_offset_m[0], setting.camera_offset_m[1], 0.0);
     let see = |pose: &Pose, noise: &mut wayhome::random::Stream| -> Vec<Bearing> {
         let mut seen = Vec::new();
+        let camera = pose.compose(&mount);
         for (k, l) in setting.landmarks.iter().enumerate() {
-            let azimuth = angle_of(pose.inverse_transform(*l)) + sd * standard_normal(noise);
+            let azimuth = angle_of(camera.inverse_transform(*l)) + sd * standard_normal(noise);
             let wrong = uniform(noise) < setting.false_share;
             let azimuth = if wrong { uniform(noise) * 6.3 } else { azimuth };
             seen.push(Bearing { id: LandmarkId(k as u32), azimuth_rad: wrap(azimuth), sd_rad: sd });
@@ -118,7 +122,7 @@ fn trial(setting: &Setting, seed: u64) -> Trial {
             .enumerate()
             .map(|(k, l)| Bearing {
                 id: LandmarkId(k as u32),
-                azimuth_rad: wrap(angle_of(*l) + sd * standard_normal(&mut noise)),
+                azimuth_rad: wrap(angle_of(mount.inverse_transform(*l)) + sd * standard_normal(&mut noise)),
                 sd_rad: sd,
             })
             .collect(),
@@ -126,7 +130,13 @@ fn trial(setting: &Setting, seed: u64) -> Trial {
     let (period, speed, radius) = (0.1, 0.3, 0.05);
     let briefing = Briefing {
         home,
-        robot: RobotSheet { track_m: 0.23, max_speed_m_s: speed, max_turn_rate_rad_s: 1.9, max_acceleration_m_s2: 0.9 },
+        robot: RobotSheet {
+            track_m: 0.23,
+            camera_offset_m: setting.camera_offset_m,
+            max_speed_m_s: speed,
+            max_turn_rate_rad_s: 1.9,
+            max_acceleration_m_s2: 0.9,
+        },
         task: TaskSheet { speed_m_s: speed, control_period_s: period, arrival_radius_m: radius },
         compass: false,
         camera: None,
@@ -228,6 +238,7 @@ fn base(count: usize, bearing_sd_deg: f64) -> Setting {
         distance_m: (0.5, 3.0),
         carried: None,
         slips: false,
+        camera_offset_m: [0.0; 2],
     }
 }
 
@@ -258,6 +269,19 @@ fn home_from_nothing_known() {
 fn covariance_is_honest_at_the_end() {
     let summary = run("8 landmarks, 0.3 deg, slipping", &Setting { slips: true, ..base(8, 0.3) }, 200);
     assert!((2.67..3.35).contains(&summary.last_nees), "{}", summary.last_nees);
+}
+
+/// What a camera beside the axle sees is of itself; home is where the robot stood all the same, and the covariance as honest as
+/// above the axle.
+#[test]
+fn a_camera_beside_the_axle_brings_the_robot_home() {
+    let beside = |setting: Setting| Setting { camera_offset_m: [0.09, -0.04], ..setting };
+    let summary = run("camera beside the axle", &beside(Setting { slips: true, ..base(8, 0.3) }), 200);
+    assert!(summary.home >= 196 && summary.wrong_claims == 0, "{} of 200", summary.home);
+    assert!((2.67..3.35).contains(&summary.last_nees), "{}", summary.last_nees);
+    let carried = Setting { carried: Some((2.5, Pose::new(0.0, 0.12, 0.35))), distance_m: (1.5, 3.0), ..base(30, 0.3) };
+    let summary = run("camera beside the axle, kick", &beside(carried), 40);
+    assert!(summary.home >= 39 && summary.wrong_claims == 0, "{} of 40", summary.home);
 }
 
 /// A compass-free average landmark vector moves homewards, if less well; it shows that the trial itself is sound.

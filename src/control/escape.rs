@@ -111,7 +111,13 @@ mod tests {
     /// free space.
     #[test]
     fn a_blocked_robot_gets_past_and_a_free_one_is_left_alone() {
-        let robot = RobotSheet { track_m: 0.23, max_speed_m_s: 0.3, max_turn_rate_rad_s: 1.9, max_acceleration_m_s2: 0.9 };
+        let robot = RobotSheet {
+            track_m: 0.23,
+            camera_offset_m: [0.0; 2],
+            max_speed_m_s: 0.3,
+            max_turn_rate_rad_s: 1.9,
+            max_acceleration_m_s2: 0.9,
+        };
         let task = TaskSheet { speed_m_s: 0.3, control_period_s: 0.1, arrival_radius_m: 0.05 };
         let mut escape = Escape::new(robot, task);
         let mut pose = Pose::IDENTITY;

@@ -107,7 +107,13 @@ mod tests {
     fn controller(law: Law) -> Controller {
         Controller::new(
             law,
-            RobotSheet { track_m: 0.23, max_speed_m_s: 0.3, max_turn_rate_rad_s: 1.9, max_acceleration_m_s2: 0.9 },
+            RobotSheet {
+                track_m: 0.23,
+                camera_offset_m: [0.0; 2],
+                max_speed_m_s: 0.3,
+                max_turn_rate_rad_s: 1.9,
+                max_acceleration_m_s2: 0.9,
+            },
             TaskSheet { speed_m_s: 0.3, control_period_s: 0.1, arrival_radius_m: 0.05 },
         )
     }

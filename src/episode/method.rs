@@ -18,7 +18,7 @@ use crate::control::{Controller, Law};
 use crate::error::{Error, Result};
 use crate::estimation::anchored::{AnchoredFilter, FilterSettings};
 use crate::geometry::{Pose, Twist, wrap};
-use crate::observation::{Briefing, Decision, Estimate, Method, Observation, Status};
+use crate::observation::{Briefing, Decision, Estimate, Method, Observation, RobotSheet, Status};
 use exec::{ExecCommand, ExecHoming};
 use paper::PaperHoming;
 use vector::VectorHoming;
@@ -209,8 +209,9 @@ struct AnchoredHoming {
 
 impl AnchoredHoming {
     fn new(settings: FilterSettings, controller: Controller, briefing: &Briefing) -> Self {
+        let RobotSheet { track_m, camera_offset_m, .. } = briefing.robot;
         Self {
-            filter: AnchoredFilter::new(FilterSettings { track_m: briefing.robot.track_m, ..settings }, &briefing.home),
+            filter: AnchoredFilter::new(FilterSettings { track_m, camera_offset_m, ..settings }, &briefing.home),
             controller,
             arrival_radius_m: briefing.task.arrival_radius_m,
             max_acceleration_m_s2: briefing.robot.max_acceleration_m_s2,

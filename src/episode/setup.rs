@@ -386,6 +386,7 @@ fn robot_sheet(world: &World) -> RobotSheet {
     let robot = &world.spec.robot;
     RobotSheet {
         track_m: robot.track_m,
+        camera_offset_m: world.spec.camera.offset_m,
         max_speed_m_s: robot.max_speed_m_s,
         max_turn_rate_rad_s: robot.max_turn_rate_rad_s,
         max_acceleration_m_s2: robot.max_acceleration_m_s2,

@@ -78,6 +78,10 @@ impl BoundSettings {
         if !(0.0..1.0).contains(&self.odometry_share) {
             return invalid("noise of odometry", self.odometry_share.to_string(), "a share from 0 to less than 1");
         }
+        let offset = world.spec.camera.offset_m;
+        if offset != [0.0; 2] {
+            return invalid("camera.offset_m of the world", format!("{offset:?}"), "[0.0, 0.0]: bearings from above the axle");
+        }
         match world.landmarks().iter().find(|l| l.motion.is_some()) {
             Some(body) => invalid("landmarks of the world", format!("`{}`, which moves", body.name), "landmarks at rest"),
             None => Ok(()),

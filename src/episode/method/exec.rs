@@ -166,7 +166,13 @@ mod tests {
     fn briefing() -> Briefing {
         Briefing {
             home: HomeSnapshot::default(),
-            robot: RobotSheet { track_m: 0.2, max_speed_m_s: 0.4, max_turn_rate_rad_s: 2.0, max_acceleration_m_s2: 0.9 },
+            robot: RobotSheet {
+                track_m: 0.2,
+                camera_offset_m: [0.0; 2],
+                max_speed_m_s: 0.4,
+                max_turn_rate_rad_s: 2.0,
+                max_acceleration_m_s2: 0.9,
+            },
             task: TaskSheet { speed_m_s: 0.3, control_period_s: 0.1, arrival_radius_m: 0.05 },
             compass: false,
             camera: None,

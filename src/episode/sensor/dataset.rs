@@ -36,7 +36,7 @@ pub struct DatasetChoice {
 #[derive(Debug)]
 pub struct DatasetField {
     set: PanoramaSet,
-    /// Where each panorama was taken, in the room.
+    /// Where the camera was when each panorama was taken, in the room.
     poses: Vec<Pose>,
     /// The grid, its frame in the room, and which panorama is at each of its places.
     grid: Option<(Grid, Pose, Vec<Option<usize>>)>,
@@ -100,7 +100,9 @@ impl DatasetField {
             })?
         };
         let origin = own_at_home[home];
-        let lay = |pose: Pose| if in_room { pose } else { world.home.compose(&origin.to_local(&pose)) };
+        // Our own sets tell where the robot stood, others where the camera did.
+        let camera_home = world.camera_pose(&world.home);
+        let lay = |pose: Pose| if in_room { world.camera_pose(&pose) } else { camera_home.compose(&origin.to_local(&pose)) };
         let poses: Vec<Pose> = own.into_iter().map(lay).collect();
         let grid = grid.filter(|_| set.entries().iter().all(|e| e.place.is_some())).map(|grid| {
             let mut held = vec![None; grid.rows * grid.columns];
@@ -112,9 +114,11 @@ impl DatasetField {
             // Our grids lie along the room's axes, those of others along the heading at home.
             let at = set.document().and_then(|d| d.grid.as_ref()).map(|g| {
                 let s = g.spacing_m;
-                Pose::new(g.first_m[0] + grid.home.j as f64 * s, g.first_m[1] - grid.home.i as f64 * s, 0.0)
+                let robot =
+                    Pose::new(g.first_m[0] + grid.home.j as f64 * s, g.first_m[1] - grid.home.i as f64 * s, origin.heading);
+                Pose { heading: 0.0, ..world.camera_pose(&robot) }
             });
-            (grid, at.unwrap_or(world.home), held)
+            (grid, at.unwrap_or(camera_home), held)
         });
         let home_heading = lay(origin).heading;
         let home = at_home.load(home)?;
@@ -134,6 +138,8 @@ pub struct DatasetSensor {
     /// Bearings of panoramas that were looked at before: azimuths in the room.
     seen: BTreeMap<usize, Vec<Bearing>>,
     last: Option<Panorama>,
+    /// The camera on the robot.
+    mount: Pose,
     timing: SensorTiming,
 }
 
@@ -148,7 +154,8 @@ impl DatasetSensor {
         for bearing in &mut home.bearings {
             bearing.azimuth_rad = wrap(bearing.azimuth_rad + turn);
         }
-        Self { field, extractor, home, seen: BTreeMap::new(), last: None, timing: SensorTiming::default() }
+        let mount = world.camera_pose(&Pose::IDENTITY);
+        Self { field, extractor, home, seen: BTreeMap::new(), last: None, mount, timing: SensorTiming::default() }
     }
 
     /// Bearings of panorama `k`, azimuths in the room.
@@ -176,11 +183,11 @@ impl DatasetSensor {
         Ok(self.seen.get(&k).map_or(&[], Vec::as_slice))
     }
 
-    /// The panorama nearest to a pose, by place and then by heading.
-    fn nearest(&self, truth: &Pose) -> Option<usize> {
+    /// The panorama nearest to a pose of the camera, by place and then by heading.
+    fn nearest(&self, camera: &Pose) -> Option<usize> {
         let key = |k: &usize| {
             let pose = self.field.poses[*k];
-            ((pose.position() - truth.position()).norm(), wrap(pose.heading - truth.heading).abs())
+            ((pose.position() - camera.position()).norm(), wrap(pose.heading - camera.heading).abs())
         };
         (0..self.field.poses.len()).min_by(|a, b| {
             let (a, b) = (key(a), key(b));
@@ -196,17 +203,18 @@ impl Sensor for DatasetSensor {
 
     fn observe(&mut self, truth: Pose, _bodies: &[Pose]) -> Result<Vec<Bearing>> {
         let field = Arc::clone(&self.field);
+        let camera = truth.compose(&self.mount);
         let mut corners: Vec<(usize, f64)> = Vec::new();
         if let Some((grid, frame, held)) = &field.grid
             && grid.rows > 1
             && grid.columns > 1
         {
-            let Some(cell) = grid.cell(frame.inverse_transform(truth.position())) else { return Ok(Vec::new()) };
+            let Some(cell) = grid.cell(frame.inverse_transform(camera.position())) else { return Ok(Vec::new()) };
             let around = cell.corners.iter().zip(cell.weights).map(|(place, weight)| Some((held[grid.index(*place)]?, weight)));
             corners = around.collect::<Option<Vec<_>>>().unwrap_or_default();
         }
         if corners.is_empty() {
-            corners.extend(self.nearest(&truth).map(|k| (k, 1.0)));
+            corners.extend(self.nearest(&camera).map(|k| (k, 1.0)));
         }
         // Sums of turns from the first corner's azimuth, weighted, and of variances.
         let mut sums: BTreeMap<LandmarkId, (f64, f64, f64, usize)> = BTreeMap::new();

@@ -10,10 +10,13 @@
 //!    [`smoother`] does it from everything stored so far, and does it again ever more seldom, so that no
 //!    linearisation from the time when ranges were unknown survives.
 //!
+//! All of it is about the camera; [`lever`] tells what that means for a robot that carries it beside its axle.
+//!
 //! A step that the wheels do not explain is given more noise until the bearings fit ([`motion`]). Where no noise of the wheels'
 //! does it (a kick, a kidnap, a wrong hypothesis) the filter is lost: it looks for the robot on its map, by resection again, and
 //! where that fails it gives its belief up and searches anew from where it stands.
 
+pub mod lever;
 pub mod map;
 pub mod motion;
 pub mod smoother;
@@ -25,6 +28,7 @@ use serde::{Deserialize, Serialize};
 use super::resection::{self, Hypothesis, position_sd_m, resect};
 use crate::geometry::{Matrix3, Pose, Vector2, angle_of, direction, wrap};
 use crate::observation::{Bearing, Estimate, HomeSnapshot, LandmarkId, Odometry};
+use lever::Lever;
 use map::{Map, Prior, Update};
 use motion::{LOOSENINGS, Motion, SlipWatch};
 use smoother::{Frame, Iterate, Sighting, Solution, Stretch};
@@ -49,6 +53,8 @@ pub struct FilterSettings {
     pub sideways_noise_share: f64,
     /// Distance between the wheels, m.
     pub track_m: f64,
+    /// Position of the camera from the middle of the axle, forward and left, m.
+    pub camera_offset_m: [f64; 2],
     /// Slip of a wheel as a share of the change of its speed over a step.
     pub slip_share: f64,
     /// Share of a step's slip that is still expected in the next one.
@@ -85,6 +91,7 @@ impl Default for FilterSettings {
             turn_noise_rad_m: 0.03,
             sideways_noise_share: 0.01,
             track_m: 0.25,
+            camera_offset_m: [0.0; 2],
             slip_share: 0.3,
             slip_persistence: 0.6,
             sideways_slip_share: 0.3,
@@ -171,6 +178,7 @@ enum Stage {
 #[derive(Debug, Clone)]
 pub struct AnchoredFilter {
     settings: FilterSettings,
+    lever: Lever,
     home: BTreeMap<LandmarkId, Bearing>,
     stage: Stage,
     map: Map,
@@ -190,6 +198,7 @@ impl AnchoredFilter {
     pub fn new(settings: FilterSettings, home: &HomeSnapshot) -> Self {
         Self {
             settings,
+            lever: Lever::new(settings.camera_offset_m),
             home: home.bearings.iter().map(|b| (b.id, *b)).collect(),
             stage: Stage::Search { guess: None },
             map: Map::at_anchor(),
@@ -214,7 +223,7 @@ impl AnchoredFilter {
         self.restarts += 1;
     }
 
-    /// Where home may be, in the frame of the first pose, likeliest first; empty once home is found. One of them is adopted when
+    /// Where the camera at home may be, in the frame of the first camera, likeliest first; empty once home is found. One of them is adopted when
     /// it is sharp and the others explain the snapshot worse by a margin.
     #[must_use]
     pub fn hypotheses(&self) -> &[Hypothesis] {
@@ -231,7 +240,8 @@ impl AnchoredFilter {
     /// the belief for more than a step: the filter is lost then, until it finds itself on its map or home anew.
     #[must_use]
     pub fn estimate(&self) -> Option<Estimate> {
-        (matches!(self.stage, Stage::Homing { .. }) && self.bad_steps <= 1).then(|| self.map.estimate())
+        (matches!(self.stage, Stage::Homing { .. }) && self.bad_steps <= 1)
+            .then(|| self.lever.axle_estimate(&self.map.estimate()))
     }
 
     /// Steps in a row that the bearings have borne out the estimate.
@@ -251,26 +261,26 @@ impl AnchoredFilter {
     #[must_use]
     pub fn best_pose(&self) -> Option<Pose> {
         match self.stage {
-            Stage::Search { guess } => guess.map(|home| home.to_local(&self.map.pose())),
-            Stage::Homing { .. } => Some(self.map.pose()),
+            Stage::Search { guess } => guess.map(|home| self.lever.axle_pose(&home.to_local(&self.map.pose()))),
+            Stage::Homing { .. } => Some(self.lever.axle_pose(&self.map.pose())),
         }
     }
 
     /// The robot's pose on the map, whatever that is anchored at: the first pose while home is searched for, then home.
     #[must_use]
     pub fn map_pose(&self) -> Pose {
-        self.map.pose()
+        self.lever.axle_pose(&self.map.pose())
     }
 
     /// Time update and measurement update.
     pub fn step(&mut self, odometry: &Odometry, bearings: &[Bearing]) -> StepReport {
         let slip_m_s = self.slip.expect(odometry, &self.settings);
-        let motion = Motion::from_odometry(odometry, slip_m_s, &self.settings);
+        let axle = Motion::from_odometry(odometry, slip_m_s, &self.settings);
         let before = self.map.pose();
-        let mut moved = Moved { before, motion, loosened: false };
+        let mut moved = Moved { before, motion: self.lever.camera_motion(&axle), loosened: false };
         if odometry.dt_s > 0.0 {
             self.map.predict(&moved.motion);
-            if let Some(more) = self.contradiction(&before, &moved.motion, odometry.dt_s, bearings) {
+            if let Some(more) = self.contradiction(&before, &axle, odometry.dt_s, bearings) {
                 self.map.loosen(&before, &more);
                 moved.motion.covariance += more;
                 moved.loosened = true;
@@ -284,8 +294,9 @@ impl AnchoredFilter {
 
     /// Noise that the step needs on top of its own for the bearings to fit: the first of [`LOOSENINGS`] that does about as well
     /// as the best of them. `None` where most bearings fit anyway, or none of them makes most fit.
-    fn contradiction(&self, before: &Pose, motion: &Motion, dt_s: f64, bearings: &[Bearing]) -> Option<Matrix3<f64>> {
-        let [a, b, c] = LOOSENINGS.map(|by| motion.loosened(by, dt_s, &self.settings));
+    fn contradiction(&self, before: &Pose, axle: &Motion, dt_s: f64, bearings: &[Bearing]) -> Option<Matrix3<f64>> {
+        let loosened = |by| self.lever.camera_covariance(axle.delta.heading, &axle.loosened(by, dt_s, &self.settings));
+        let [a, b, c] = LOOSENINGS.map(loosened);
         let tried = [Matrix3::zeros(), a, b, c];
         let (held, fits) = self.map.count_fits(bearings, before, &tried, self.settings.gate);
         let best = fits.into_iter().max()?;

@@ -183,6 +183,7 @@ pub fn anchored(law: Law, terms: &Terms, home: &HomeSnapshot) -> Result<Box<dyn 
     };
     let robot = RobotSheet {
         track_m: 0.23,
+        camera_offset_m: [0.0; 2],
         max_speed_m_s: terms.speed_m_s,
         max_turn_rate_rad_s: TURN_LIMIT_RAD_S,
         max_acceleration_m_s2: 10.0,

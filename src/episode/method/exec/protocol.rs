@@ -32,6 +32,7 @@ pub(super) struct Hello<'a> {
 #[derive(Serialize)]
 struct Robot {
     track_m: f64,
+    camera_offset_m: [f64; 2],
     max_speed_m_s: f64,
     max_turn_rate_rad_s: f64,
     max_acceleration_m_s2: f64,
@@ -68,6 +69,7 @@ impl<'a> Hello<'a> {
             version: env!("CARGO_PKG_VERSION"),
             robot: Robot {
                 track_m: robot.track_m,
+                camera_offset_m: robot.camera_offset_m,
                 max_speed_m_s: robot.max_speed_m_s,
                 max_turn_rate_rad_s: robot.max_turn_rate_rad_s,
                 max_acceleration_m_s2: robot.max_acceleration_m_s2,
