@@ -88,7 +88,8 @@ fn single(args: &HomeArgs, context: &Context, world: &World, setup: &Setup, seed
         bar.tick();
         if context.is_stopped() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     };
-    let record = bench.run_recorded(seed, &mut watch, &mut recordings)?;
+    // Inside the pool, so that this thread works on its panoramas with the others instead of waiting for them.
+    let record = rayon::scope(|_| bench.run_recorded(seed, &mut watch, &mut recordings))?;
     bar.finish_and_clear();
     let summary = Summary::new(&record, world, setup, seed);
     recordings.finish(&summary)?;

@@ -96,15 +96,13 @@ impl Default for CpuRenderer {
 
 impl Renderer for CpuRenderer {
     fn render(&mut self, scene: &Scene, view: &View<'_>, out: &mut Panorama) -> Result<()> {
-        // Inside a pool the caller already spreads pictures over the cores.
-        let alone = rayon::current_thread_index().is_none();
-        self.paint(scene, view, out, alone)
+        self.paint(scene, view, out, rayon::current_num_threads() > 1)
     }
 
     fn render_group(&mut self, scene: &Scene, views: &[View<'_>], out: &mut [Panorama]) -> Result<()> {
         assert_eq!(views.len(), out.len(), "a place for each view");
         if let ([view], [out]) = (views, &mut *out) {
-            return self.paint(scene, view, out, true);
+            return self.render(scene, view, out);
         }
         views.par_iter().zip(out).with_max_len(1).try_for_each(|(view, out)| self.paint(scene, view, out, false))
     }

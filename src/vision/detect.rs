@@ -5,8 +5,10 @@
 //! up in every picture.
 
 use std::f32::consts::TAU;
+use std::ops::Range;
 
 use super::pyramid::{BASE_SIGMA, Image, Pyramid, UNITS};
+use super::shared;
 
 /// A feature of a panorama.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -28,15 +30,27 @@ pub(super) struct Feature {
 
 /// Finds the features of a pyramid and keeps the strongest, spread over azimuth and scale, in an order that depends on the
 /// picture only. Returns the strength below which no feature had a chance to be kept: 0 if none was too weak.
-pub(super) fn detect(pyramid: &Pyramid, criteria: &Criteria, scratch: &mut Scratch, features: &mut Vec<Feature>) -> f32 {
-    features.clear();
+pub(super) fn detect(pyramid: &Pyramid, criteria: &Criteria, features: &mut Vec<Feature>) -> f32 {
     let layers = 2 * pyramid.octaves.len();
-    for layer in 0..layers - 1 {
-        scan(pyramid, layer, criteria, scratch, features);
-    }
+    let bands = (0..layers - 1).flat_map(|layer| {
+        let image = &pyramid.octaves[layer / 2].difference[layer % 2];
+        let rows = (BAND_PIXELS / image.width).max(1);
+        (1..image.height - 1).step_by(rows).map(move |y| (layer, y..(y + rows).min(image.height - 1)))
+    });
+    let bands: Vec<_> = bands.collect();
+    *features = shared(bands.len(), |some| {
+        let (mut scratch, mut features) = (Scratch::default(), Vec::new());
+        for (layer, rows) in &bands[some] {
+            scan(pyramid, *layer, rows.clone(), criteria, &mut scratch, &mut features);
+        }
+        features
+    });
     let width = pyramid.octaves[0].gauss[0].width as f32;
     spread(features, width, criteria)
 }
+
+/// Pixels that are scanned at a time by one thread.
+const BAND_PIXELS: usize = 1 << 15;
 
 /// A layer next to the one that is scanned, addressed in the pixels of that one.
 struct Neighbour<'a> {
@@ -86,17 +100,25 @@ pub(super) struct Criteria {
     pub contenders: usize,
 }
 
-fn scan(pyramid: &Pyramid, layer: usize, criteria: &Criteria, scratch: &mut Scratch, features: &mut Vec<Feature>) {
+/// Adds the features of some rows of a layer.
+fn scan(
+    pyramid: &Pyramid,
+    layer: usize,
+    rows: Range<usize>,
+    criteria: &Criteria,
+    scratch: &mut Scratch,
+    features: &mut Vec<Feature>,
+) {
     let octave = &pyramid.octaves[layer / 2];
     let image = &octave.difference[layer % 2];
-    let (width, height) = (image.width, image.height);
+    let width = image.width;
     let coarser = Neighbour::new(pyramid, layer + 1, layer);
     // The finest layer has none below it: what is smallest there may be smaller still, and is taken as it is.
     let finer = (layer > 0).then(|| Neighbour::new(pyramid, layer - 1, layer));
     // One of the two lies in the same octave. It is asked first, since it needs no interpolation.
     let (first, last) =
         if layer.is_multiple_of(2) { (Some(&coarser), finer.as_ref()) } else { (finer.as_ref(), Some(&coarser)) };
-    for y in 1..height - 1 {
+    for y in rows {
         let rows = [image.row(y - 1), image.row(y), image.row(y + 1)];
         scratch.find(rows, criteria.contrast);
         for &x in &scratch.found {
@@ -135,7 +157,7 @@ fn scan(pyramid: &Pyramid, layer: usize, criteria: &Criteria, scratch: &mut Scra
 
 /// Buffers of the scan.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Scratch {
+struct Scratch {
     high: Vec<i16>,
     low: Vec<i16>,
     mask: Vec<u8>,

@@ -116,24 +116,25 @@ pub(super) struct Seen<'a> {
     pub horizon: f32,
 }
 
-/// Compares the current features with those home features that may be the same, which agree in height over size to within
+/// Compares `some` of the current features with those home features that may be the same, which agree in height over size to within
 /// `slack` (an absolute and a relative part). Candidates come grouped by current feature; those with a distance above `limit`
 /// are left out.
 #[multiversion::multiversion(targets(
     "x86_64+avx512f+avx512bw+avx512dq+avx512vl+avx2+bmi1+bmi2+lzcnt+popcnt",
     "x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"
 ))]
-pub(super) fn compare(gallery: &Gallery, seen: Seen<'_>, slack: (f32, f32), limit: f32, candidates: &mut Vec<Candidate>) {
+pub(super) fn compare(gallery: &Gallery, seen: Seen<'_>, some: Range<usize>, slack: (f32, f32), limit: f32) -> Vec<Candidate> {
     let distance = |a: &Descriptor, b: &Descriptor| {
         match_target! {
             "x86_64+avx2" => distance_avx2(a, b),
             _ => distance(a, b),
         }
     };
-    candidates.clear();
+    let mut candidates = Vec::new();
     let hopeless = (HOPELESS * limit * UNRELATED) as u32;
     let limit = (limit * UNRELATED) as u32;
-    for (now, (feature, descriptor)) in seen.features.iter().zip(seen.descriptors).enumerate() {
+    for now in some {
+        let (feature, descriptor) = (&seen.features[now], &seen.descriptors[now]);
         let sizes = feature.sigma / ZOOM..=feature.sigma * ZOOM;
         for k in gallery.alike(feature, seen.horizon, slack) {
             let entry = &gallery.entries[k];
@@ -152,6 +153,7 @@ pub(super) fn compare(gallery: &Gallery, seen: Seen<'_>, slack: (f32, f32), limi
             }
         }
     }
+    candidates
 }
 
 /// The features of one of the two panoramas.
@@ -228,8 +230,7 @@ mod tests {
         let sum: i32 = home.iter().zip(&now).map(|(a, b)| (i32::from(*a) - i32::from(*b)).abs()).sum();
         let gallery = Gallery::new(&[feature], &[], 0.0, |_, _| home);
         let seen = Seen { features: &[feature], descriptors: &[now], horizon: 0.0 };
-        let mut candidates = Vec::new();
-        compare(&gallery, seen, (1.0, 0.0), 2.0 * sum as f32 / UNRELATED, &mut candidates);
+        let candidates = compare(&gallery, seen, 0..1, (1.0, 0.0), 2.0 * sum as f32 / UNRELATED);
         assert_eq!(candidates, [Candidate { now: 0, home: 0, distance: sum as f32 / UNRELATED }]);
     }
 }

@@ -17,6 +17,9 @@ mod motion;
 mod objects;
 mod pyramid;
 
+use std::ops::Range;
+
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::geometry::direction;
@@ -25,7 +28,7 @@ use crate::panorama::{Panorama, Projection};
 use crate::random::Seed;
 
 use describe::{Describer, Descriptor};
-use detect::{Criteria, Feature, Scratch};
+use detect::{Criteria, Feature};
 use matching::{Candidate, Choice, Gallery, Seen, View};
 use motion::{Pair, PlanarMotion, Sight};
 use objects::{Found, Objects, Place};
@@ -184,7 +187,6 @@ pub struct Extractor {
     criteria: Criteria,
     describer: Describer,
     pyramid: Pyramid,
-    scratch: Scratch,
     home_projection: Projection,
     home: Vec<Feature>,
     home_sights: Vec<Sight>,
@@ -192,7 +194,6 @@ pub struct Extractor {
     objects: Option<Objects>,
     now: Vec<Feature>,
     descriptors: Vec<Descriptor>,
-    candidates: Vec<Candidate>,
     matches: Vec<Match>,
 }
 
@@ -202,7 +203,6 @@ impl Extractor {
     pub fn new(settings: ExtractorSettings, home: &Panorama) -> Self {
         let mut pyramid = Pyramid::default();
         let describer = Describer::new();
-        let mut scratch = Scratch::default();
         let mut features = Vec::new();
         pyramid.build(home, settings.octaves);
         let mut criteria = Criteria {
@@ -212,7 +212,7 @@ impl Extractor {
             limit: settings.home_features,
             contenders: settings.contenders(settings.home_features),
         };
-        let hopeless = detect::detect(&pyramid, &criteria, &mut scratch, &mut features);
+        let hopeless = detect::detect(&pyramid, &criteria, &mut features);
         // Later panoramas show much the same surfaces: what is far too weak here need not be looked at there.
         criteria.contrast = criteria.contrast.max(0.75 * hopeless);
         criteria.limit = settings.features;
@@ -231,7 +231,6 @@ impl Extractor {
             criteria,
             describer,
             pyramid,
-            scratch,
             home_projection: projection,
             home: features,
             home_sights,
@@ -239,7 +238,6 @@ impl Extractor {
             objects,
             now: Vec::new(),
             descriptors: Vec::new(),
-            candidates: Vec::new(),
             matches: Vec::new(),
         }
     }
@@ -344,14 +342,14 @@ impl Extractor {
     fn find_features(&mut self, now: &Panorama) {
         let settings = &self.settings;
         self.pyramid.build(now, settings.octaves);
-        let hopeless = detect::detect(&self.pyramid, &self.criteria, &mut self.scratch, &mut self.now);
+        let hopeless = detect::detect(&self.pyramid, &self.criteria, &mut self.now);
         if hopeless == 0.0 && self.criteria.contrast > settings.contrast {
             // Fewer than compete for a place at home: a poorer view, or darker light.
             let all = Criteria { contrast: settings.contrast, ..self.criteria };
-            detect::detect(&self.pyramid, &all, &mut self.scratch, &mut self.now);
+            detect::detect(&self.pyramid, &all, &mut self.now);
         }
-        self.descriptors.clear();
-        self.descriptors.extend(self.now.iter().map(|f| self.describer.describe(&self.pyramid, f, settings.cell, 1.0)));
+        let describe = |f: &Feature| self.describer.describe(&self.pyramid, f, settings.cell, 1.0);
+        self.descriptors = shared(self.now.len(), |some| self.now[some].iter().map(describe).collect());
     }
 
     /// Matches that fit one planar motion.
@@ -359,7 +357,8 @@ impl Extractor {
         let settings = &self.settings;
         let seen = Seen { features: &self.now, descriptors: &self.descriptors, horizon: horizon(projection) };
         let limit = RUNNER_UP * settings.distance;
-        matching::compare(&self.gallery, seen, settings.height_slack, limit, &mut self.candidates);
+        let compare = |some: Range<usize>| matching::compare(&self.gallery, seen, some, settings.height_slack, limit);
+        let candidates = shared(self.now.len(), compare);
         let home = View { features: &self.home, width: self.home_projection.width as f32 };
         let now = View { features: &self.now, width: projection.width as f32 };
         let sights: Vec<Sight> = self.now.iter().map(|f| sight(f, projection, settings)).collect();
@@ -367,19 +366,33 @@ impl Extractor {
             let pair = |c: &Choice| Pair { home: self.home_sights[c.candidate.home], now: sights[c.candidate.now] };
             choices.iter().map(pair).collect()
         };
-        let first = matching::choose(&self.candidates, home, now, settings.distance, settings.ratio, |_| true);
+        let first = matching::choose(&candidates, home, now, settings.distance, settings.ratio, |_| true);
         let Some(motion) = motion::estimate(&pairs(&first), settings.draws, Seed(settings.seed)) else { return Vec::new() };
         // With the motion known, ambiguous matches are taken where they fit it; then once more with the motion of them all.
         let guided = |motion: PlanarMotion| {
             let frame = motion.frame();
             let fits = |c: &Candidate| frame.fit(&self.home_sights[c.home], &sights[c.now]).is_good();
-            matching::choose(&self.candidates, home, now, settings.distance, settings.guided_ratio, fits)
+            matching::choose(&candidates, home, now, settings.distance, settings.guided_ratio, fits)
         };
         let motion = motion::polish(&pairs(&guided(motion)), motion);
         let frame = motion.frame();
         let chi2 = |c: &Candidate| frame.fit(&self.home_sights[c.home], &sights[c.now]).chi2;
         guided(motion).into_iter().map(|c| (c.candidate, chi2(&c.candidate))).collect()
     }
+}
+
+/// Pieces of work for each thread: more than one, for they take unequal time.
+const PIECES: usize = 4;
+
+/// What `work` makes of the numbers from 0 to `count`, in their order, by all threads of the pool.
+fn shared<T: Send>(count: usize, work: impl Fn(Range<usize>) -> Vec<T> + Sync) -> Vec<T> {
+    let threads = rayon::current_num_threads();
+    if threads == 1 {
+        return work(0..count);
+    }
+    let size = count.div_ceil(PIECES * threads).max(1);
+    let starts: Vec<usize> = (0..count).step_by(size).collect();
+    starts.into_par_iter().with_max_len(1).flat_map_iter(|start| work(start..count.min(start + size))).collect()
 }
 
 /// Candidates are kept up to this many times the largest distance of a match, to serve as runners-up.

@@ -7,8 +7,14 @@
 //!
 //! Columns wrap round: the seam of the panorama is no border. Rows are clamped at top and bottom.
 //!
+//! Each image is made of the one before in bands of rows, one a thread; small images are not worth sharing.
+//!
 //! Grey levels are kept in sixteenths, as 16-bit integers: twice as many fit a vector register as floats, and the binomial
 //! sums of them just do not overflow.
+
+use std::ops::Range;
+
+use rayon::prelude::*;
 
 use crate::panorama::Panorama;
 
@@ -20,6 +26,9 @@ pub(super) const UNITS: f32 = 16.0;
 
 /// Columns of the left end that rows are followed by.
 pub(super) const MARGIN: usize = 64;
+
+/// Fewest pixels that are worth waking another thread for.
+const WORTH_SHARING: usize = 1 << 15;
 
 /// A grey image whose columns are cyclic. Each row is followed by a copy of its first columns, so that a piece of a row across
 /// the seam is a slice like any other.
@@ -49,23 +58,13 @@ impl<T: Copy + Default + Into<f32>> Image<T> {
         &self.data[y * (self.width + MARGIN)..(y + 1) * (self.width + MARGIN)]
     }
 
-    /// Row `y` to be written; its margin follows by [`Image::close`].
-    #[inline]
-    fn row_mut(&mut self, y: usize) -> &mut [T] {
-        let start = y * (self.width + MARGIN);
-        &mut self.data[start..start + self.width]
-    }
-
-    /// Fills the margin of row `y`.
-    #[inline]
-    fn close(&mut self, y: usize) {
-        let start = y * (self.width + MARGIN);
-        let row = &mut self.data[start..start + self.width + MARGIN];
-        let (row, margin) = row.split_at_mut(self.width);
-        // A narrow picture goes round more than once.
-        for part in margin.chunks_mut(row.len()) {
-            part.copy_from_slice(&row[..part.len()]);
-        }
+    /// All rows to be written, in bands of which each thread gets one.
+    fn bands_mut(&mut self) -> Vec<Band<'_, T>> {
+        let most = (self.width * self.height / WORTH_SHARING).max(1);
+        let rows = self.height.div_ceil(rayon::current_num_threads().min(most)).max(1);
+        let (width, pitch) = (self.width, self.width + MARGIN);
+        let bands = self.data.chunks_mut(rows * pitch).enumerate();
+        bands.map(|(k, data)| Band { first_row: k * rows, width, data }).collect()
     }
 
     /// Value between pixels: columns wrap, rows are clamped.
@@ -78,6 +77,49 @@ impl<T: Copy + Default + Into<f32>> Image<T> {
         let top = a0 + fx * (a1 - a0);
         let bottom = b0 + fx * (b1 - b0);
         top + fy * (bottom - top)
+    }
+}
+
+/// Some rows of an image, to be written.
+struct Band<'a, T> {
+    first_row: usize,
+    width: usize,
+    data: &'a mut [T],
+}
+
+impl<T: Copy> Band<'_, T> {
+    fn rows(&self) -> Range<usize> {
+        self.first_row..self.first_row + self.data.len() / (self.width + MARGIN)
+    }
+
+    /// Row `y` of the image; its margin follows by [`Band::close`].
+    #[inline]
+    fn row_mut(&mut self, y: usize) -> &mut [T] {
+        let start = (y - self.first_row) * (self.width + MARGIN);
+        &mut self.data[start..start + self.width]
+    }
+
+    /// Fills the margin of row `y`.
+    #[inline]
+    fn close(&mut self, y: usize) {
+        let start = (y - self.first_row) * (self.width + MARGIN);
+        let (row, margin) = self.data[start..start + self.width + MARGIN].split_at_mut(self.width);
+        // A narrow picture goes round more than once.
+        for part in margin.chunks_mut(row.len()) {
+            part.copy_from_slice(&row[..part.len()]);
+        }
+    }
+}
+
+/// Works on bands, each in a thread of its own.
+fn share<B: Send>(mut bands: Vec<B>, work: impl Fn(B) + Send + Sync) {
+    match bands.pop() {
+        Some(only) if bands.is_empty() => work(only),
+        Some(last) => {
+            bands.push(last);
+            bands.into_par_iter().with_max_len(1).for_each(work);
+        }
+        None => {}
     }
 }
 
@@ -118,7 +160,6 @@ pub(super) struct Octave {
 pub(super) struct Pyramid {
     pub octaves: Vec<Octave>,
     luma: Image<u16>,
-    line: Vec<u16>,
 }
 
 impl Pyramid {
@@ -126,9 +167,11 @@ impl Pyramid {
     pub fn build(&mut self, panorama: &Panorama, octaves: usize) {
         let (width, height) = (panorama.projection.width as usize, panorama.projection.height as usize);
         self.luma.resize(width, height);
-        for (y, row) in panorama.rgba.chunks_exact(4 * width).enumerate() {
-            luma(row, self.luma.row_mut(y));
-        }
+        share(self.luma.bands_mut(), |mut band| {
+            for y in band.rows() {
+                luma(&panorama.rgba[4 * width * y..4 * width * (y + 1)], band.row_mut(y));
+            }
+        });
         let wanted = (0..octaves.max(1)).take_while(|&o| o == 0 || (height >> o >= 16 && width >> o >= 64)).count();
         self.octaves.resize_with(wanted, Octave::default);
         for o in 0..wanted {
@@ -138,7 +181,7 @@ impl Pyramid {
                 None => {
                     octave.step_x = 1.0;
                     octave.step_y = 1.0;
-                    blur(&self.luma, &mut octave.gauss[0], None, &mut self.line);
+                    blur(&self.luma, &mut octave.gauss[0], None);
                 }
                 Some(finer) => {
                     halve(&finer.gauss[2], &mut octave.gauss[0]);
@@ -148,9 +191,9 @@ impl Pyramid {
             }
             let [g0, g1, g2] = &mut octave.gauss;
             let [d0, d1] = &mut octave.difference;
-            blur(g0, g1, Some((g0, d0)), &mut self.line);
-            blur(g1, &mut octave.scratch, None, &mut self.line);
-            blur(&octave.scratch, g2, Some((g1, d1)), &mut self.line);
+            blur(g0, g1, Some((g0, d0)));
+            blur(g1, &mut octave.scratch, None);
+            blur(&octave.scratch, g2, Some((g1, d1)));
         }
     }
 }
@@ -173,18 +216,25 @@ type Difference<'a> = (&'a Image<u16>, &'a mut Image<i16>);
 
 /// Convolves with the binomial (1 4 6 4 1) / 16 both ways: variance 1. The difference of the result from a finer image is taken
 /// along while the result is at hand.
+fn blur(source: &Image<u16>, target: &mut Image<u16>, difference: Option<Difference<'_>>) {
+    target.resize(source.width, source.height);
+    let Some((finer, difference)) = difference else {
+        return share(target.bands_mut(), |band| blur_band(source, band, None));
+    };
+    difference.resize(source.width, source.height);
+    let bands = target.bands_mut().into_iter().zip(difference.bands_mut());
+    share(bands.collect(), |(band, difference)| blur_band(source, band, Some((finer, difference))));
+}
+
+/// [`blur`] of some rows.
 #[multiversion::multiversion(targets(
     "x86_64+avx512f+avx512bw+avx512dq+avx512vl+avx2+bmi1+bmi2+lzcnt+popcnt",
     "x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"
 ))]
-fn blur(source: &Image<u16>, target: &mut Image<u16>, mut difference: Option<Difference<'_>>, line: &mut Vec<u16>) {
+fn blur_band(source: &Image<u16>, mut target: Band<'_, u16>, mut difference: Option<(&Image<u16>, Band<'_, i16>)>) {
     let (width, height) = (source.width, source.height);
-    target.resize(width, height);
-    if let Some((_, difference)) = &mut difference {
-        difference.resize(width, height);
-    }
-    line.resize(width + 4, 0);
-    for y in 0..height {
+    let mut line = vec![0; width + 4];
+    for y in target.rows() {
         let row = |dy: isize| source.row(y.saturating_add_signed(dy).min(height - 1));
         let (a, b, c, d, e) = (row(-2), row(-1), row(0), row(1), row(2));
         for (((((out, a), b), c), d), e) in line[2..width + 2].iter_mut().zip(a).zip(b).zip(c).zip(d).zip(e) {
@@ -228,22 +278,24 @@ fn halve(source: &Image<u16>, target: &mut Image<u16>) {
     target.resize(width, source.height.div_ceil(2));
     let even = source.width.is_multiple_of(2);
     let step = source.width as f32 / width as f32;
-    for y in 0..target.height {
-        let from = source.row(2 * y);
-        let to = target.row_mut(y);
-        if even {
-            for (to, from) in to.iter_mut().zip(from.chunks_exact(2)) {
-                *to = from[0];
+    share(target.bands_mut(), |mut band| {
+        for y in band.rows() {
+            let from = source.row(2 * y);
+            let to = band.row_mut(y);
+            if even {
+                for (to, from) in to.iter_mut().zip(from.chunks_exact(2)) {
+                    *to = from[0];
+                }
+            } else {
+                for (x, to) in to.iter_mut().enumerate() {
+                    let (x0, x1, f) = split_cyclic(x as f32 * step, source.width);
+                    let (a, b) = (f32::from(from[x0]), f32::from(from[x1]));
+                    *to = (a + f * (b - a) + 0.5) as u16;
+                }
             }
-        } else {
-            for (x, to) in to.iter_mut().enumerate() {
-                let (x0, x1, f) = split_cyclic(x as f32 * step, source.width);
-                let (a, b) = (f32::from(from[x0]), f32::from(from[x1]));
-                *to = (a + f * (b - a) + 0.5) as u16;
-            }
+            band.close(y);
         }
-        target.close(y);
-    }
+    });
 }
 
 #[cfg(test)]
