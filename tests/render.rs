@@ -246,10 +246,12 @@ fn threads_do_not_change_the_picture() {
     let world = world(HALL);
     let projection = Projection::new(300, 151);
     let robot = Pose::new(-0.5, -1.2, 0.4);
-    // Outside a pool the rows are shared out, inside they are not.
-    let shared = render(&world, projection, robot);
-    let alone = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap().install(|| render(&world, projection, robot));
-    assert!(shared == alone);
+    let by = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| render(&world, projection, robot))
+    };
+    let alone = by(1);
+    assert!(by(3) == alone && by(8) == alone);
 }
 
 #[test]

@@ -270,7 +270,12 @@ fn observations_repeat_and_are_in_order() {
     let first = extractor.observe(&far);
     extractor.observe(&near);
     assert_eq!(extractor.observe(&far), first);
-    assert_eq!(Extractor::new(ExtractorSettings::default(), &home).observe(&far), first);
+    // Threads share the work by bands and pieces, whose borders differ with their number.
+    for threads in [1, 3, 8] {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let again = pool.install(|| Extractor::new(ExtractorSettings::default(), &home).observe(&far));
+        assert_eq!(again, first, "{threads} threads");
+    }
     assert!(first.windows(2).all(|w| w[0].id < w[1].id));
     assert!(first.iter().all(|b| b.sd_rad > 0.0 && b.azimuth_rad.abs() <= std::f64::consts::PI));
 }

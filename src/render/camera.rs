@@ -140,8 +140,7 @@ impl Camera {
         let camera = &*self;
         let key = noise::key(noise);
         let row = |buffer: &mut Vec<f32>, (row, out): (usize, &mut [u8])| develop_row(camera, width, row, key, buffer, out);
-        // Inside a pool the caller already spreads pictures over the cores.
-        if rayon::current_thread_index().is_some() {
+        if rayon::current_num_threads() == 1 {
             let mut buffer = Vec::new();
             out.rgba.chunks_mut(4 * width).enumerate().for_each(|one| row(&mut buffer, one));
         } else {

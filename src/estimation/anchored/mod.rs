@@ -223,8 +223,8 @@ impl AnchoredFilter {
         self.restarts += 1;
     }
 
-    /// Where the camera at home may be, in the frame of the first camera, likeliest first; empty once home is found. One of them is adopted when
-    /// it is sharp and the others explain the snapshot worse by a margin.
+    /// Where the camera at home may be, in the frame of the first camera, likeliest first; empty once home is found. One of them
+    /// is adopted when it is sharp and the others explain the snapshot worse by a margin.
     #[must_use]
     pub fn hypotheses(&self) -> &[Hypothesis] {
         &self.hypotheses
@@ -495,10 +495,10 @@ impl AnchoredFilter {
             stored.motion = motion;
         }
         // Beyond what is usual for wheels that turn, and change their speed, as much.
-        let settings = &self.settings;
+        let (settings, axle) = (&self.settings, |camera: Pose| self.lever.axle_pose(&camera));
         let slip = |steps: &[Stored]| {
-            let (past, told) = (steps[1].motion.delta, steps[2].motion.delta);
-            let went = steps[1].pose.to_local(&steps[2].pose).position();
+            let (past, told) = (axle(steps[1].motion.delta), axle(steps[2].motion.delta));
+            let went = axle(steps[1].pose.to_local(&steps[2].pose)).position();
             let length = told.position().norm();
             let turned = 0.5 * settings.track_m * wrap(told.heading - past.heading).abs();
             let changed = (length - past.position().norm()).abs() + turned;
