@@ -18,6 +18,7 @@ use wayhome::vision::{Extractor, ExtractorSettings};
 use wayhome::world::World;
 
 fn benches(c: &mut Criterion) {
+    rayon::ThreadPoolBuilder::new().num_threads(1).build_global().unwrap();
     let world = World::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("worlds/lab.toml")).unwrap();
     let scene = Scene::new(&world).unwrap();
     let bodies = world.body_poses();
