@@ -20,6 +20,7 @@ use wayhome::world::World;
 use super::Verdict;
 use super::args::{self, HomeArgs};
 use super::context::{Context, default_folder};
+use super::threads::awake;
 
 /// What `--json` prints for one run: its summary and where the files are.
 #[derive(Serialize)]
@@ -88,8 +89,8 @@ fn single(args: &HomeArgs, context: &Context, world: &World, setup: &Setup, seed
         bar.tick();
         if context.is_stopped() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     };
-    // Inside the pool, so that this thread works on its panoramas with the others instead of waiting for them.
-    let record = rayon::scope(|_| bench.run_recorded(seed, &mut watch, &mut recordings))?;
+    let mut run = || bench.run_recorded(seed, &mut watch, &mut recordings);
+    let record = if setup.bearings.are_seen() { awake(run)?? } else { run()? };
     bar.finish_and_clear();
     let summary = Summary::new(&record, world, setup, seed);
     recordings.finish(&summary)?;

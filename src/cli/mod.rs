@@ -19,6 +19,7 @@ mod render_report;
 mod reproduce;
 mod robustness;
 mod sweep;
+mod threads;
 mod vision_report;
 mod world;
 

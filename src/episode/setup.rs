@@ -48,6 +48,14 @@ pub enum Bearings {
     Dataset,
 }
 
+impl Bearings {
+    /// Whether they are found in panoramas, which takes most of a run's time.
+    #[must_use]
+    pub fn are_seen(self) -> bool {
+        matches!(self, Self::Rendered | Self::Dataset)
+    }
+}
+
 /// Light and camera of [`Bearings::Rendered`]. What is `None` is as the world has it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Look {
