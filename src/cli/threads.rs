@@ -51,7 +51,7 @@ mod tests {
     fn work_is_shared_and_what_it_gives_comes_back() {
         let sum = awake(|| {
             assert!(rayon::current_num_threads() <= MOST);
-            (0..1000_u64).into_par_iter().with_max_len(1).sum::<u64>()
+            (0..1000_u32).into_par_iter().with_max_len(1).sum::<u32>()
         });
         assert_eq!(sum.unwrap(), 499_500);
     }

@@ -32,25 +32,20 @@ pub(super) struct Feature {
 /// picture only. Returns the strength below which no feature had a chance to be kept: 0 if none was too weak.
 pub(super) fn detect(pyramid: &Pyramid, criteria: &Criteria, features: &mut Vec<Feature>) -> f32 {
     let layers = 2 * pyramid.octaves.len();
-    let bands = (0..layers - 1).flat_map(|layer| {
-        let image = &pyramid.octaves[layer / 2].difference[layer % 2];
-        let rows = (BAND_PIXELS / image.width).max(1);
-        (1..image.height - 1).step_by(rows).map(move |y| (layer, y..(y + rows).min(image.height - 1)))
-    });
-    let bands: Vec<_> = bands.collect();
-    *features = shared(bands.len(), |some| {
+    // Each thread scans the rows that it made, which lie in its own cache.
+    let parts = rayon::current_num_threads();
+    *features = shared(parts, |some| {
         let (mut scratch, mut features) = (Scratch::default(), Vec::new());
-        for (layer, rows) in &bands[some] {
-            scan(pyramid, *layer, rows.clone(), criteria, &mut scratch, &mut features);
+        for layer in 0..layers - 1 {
+            let rows = pyramid.octaves[layer / 2].difference[layer % 2].height - 2;
+            let rows = 1 + rows * some.start / parts..1 + rows * some.end / parts;
+            scan(pyramid, layer, rows, criteria, &mut scratch, &mut features);
         }
         features
     });
     let width = pyramid.octaves[0].gauss[0].width as f32;
     spread(features, width, criteria)
 }
-
-/// Pixels that are scanned at a time by one thread.
-const BAND_PIXELS: usize = 1 << 15;
 
 /// A layer next to the one that is scanned, addressed in the pixels of that one.
 struct Neighbour<'a> {
@@ -256,16 +251,13 @@ fn spread(features: &mut Vec<Feature>, width: f32, criteria: &Criteria) -> f32 {
     let Criteria { limit, contenders, .. } = *criteria;
     let reach = criteria.spread_rad as f32 / TAU * width;
     let mut least = 0.0;
-    let by_strength = |a: &Feature, b: &Feature| b.response.abs().total_cmp(&a.response.abs());
-    let by_place = |a: &Feature, b: &Feature| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)).then(a.sigma.total_cmp(&b.sigma));
     if features.len() > contenders {
-        let order = |a: &Feature, b: &Feature| by_strength(a, b).then_with(|| by_place(a, b));
-        features.select_nth_unstable_by(contenders, order);
+        features.select_nth_unstable_by_key(contenders, |f| (weakness(f), place(f)));
         least = features[contenders].response.abs();
         features.truncate(contenders);
     }
     if features.len() > limit {
-        features.sort_by(|a, b| a.octave.cmp(&b.octave).then_with(|| by_place(a, b)));
+        features.sort_unstable_by_key(|f| (f.octave, place(f)));
         let mut ranked = Vec::with_capacity(features.len());
         let (mut places, mut strengths) = (Vec::new(), Vec::new());
         for class in features.chunk_by(|a, b| a.octave == b.octave) {
@@ -289,11 +281,23 @@ fn spread(features: &mut Vec<Feature>, width: f32, criteria: &Criteria) -> f32 {
                 ranked.push((rank, *feature));
             }
         }
-        ranked.sort_by(|a, b| a.0.cmp(&b.0).then_with(|| by_strength(&a.1, &b.1)).then_with(|| by_place(&a.1, &b.1)));
+        ranked.select_nth_unstable_by_key(limit, |(rank, f)| (*rank, weakness(f), place(f)));
         ranked.truncate(limit);
         features.clear();
         features.extend(ranked.into_iter().map(|(_, feature)| feature));
     }
-    features.sort_by(by_place);
+    features.sort_unstable_by_key(place);
     least
 }
+
+/// Orders features from the strongest to the weakest.
+fn weakness(feature: &Feature) -> u32 {
+    !feature.response.abs().to_bits()
+}
+
+/// Orders features by column, then by row and scale. From 0 on the bits of floats are in their order; adding 0 takes away the sign
+/// of -0.
+fn place(feature: &Feature) -> (u32, u32, u32) {
+    ((feature.x + 0.0).to_bits(), feature.y.to_bits(), feature.sigma.to_bits())
+}
+
