@@ -64,14 +64,14 @@ pub fn text(findings: &Findings) -> String {
 /// Heading of [`line()`].
 #[must_use]
 pub fn header() -> String {
-    format!("{:14} {:>10} {:>7} {:>12} {:>12} {:>15}", "", "size", "threads", "panoramas/s", "colours MB/s", "share of memset")
+    format!("{:20} {:>10} {:>7} {:>12} {:>12} {:>15}", "", "size", "threads", "panoramas/s", "colours MB/s", "share of memset")
 }
 
 /// A figure as a line.
 #[must_use]
 pub fn line(speed: &Speed) -> String {
     format!(
-        "{:14} {:>10} {:>7} {:>12.0} {:>12.0} {:>13.1} %",
+        "{:20} {:>10} {:>7} {:>12.0} {:>12.0} {:>13.1} %",
         speed.what,
         format!("{}x{}", speed.width, speed.height),
         speed.threads,

@@ -109,7 +109,8 @@ pub struct Findings {
     pub cpu: RendererInfo,
     /// Graphics adapter; `None` where there is none.
     pub gpu: Option<RendererInfo>,
-    /// Size by size: CPU, instruction set by instruction set, on one thread, then two, then the GPU.
+    /// Size by size: CPU, instruction set by instruction set, one picture at a time; the widest in batches, on one thread and on
+    /// two; then the GPU.
     pub speeds: Vec<Speed>,
     /// Size at which bodies are counted.
     pub bodies_size: (u32, u32),
@@ -118,11 +119,11 @@ pub struct Findings {
 }
 
 impl Findings {
-    /// How many times as fast two threads are as one, on the widest instruction set, size by size.
+    /// How many times as fast two threads are as one, in batches on the widest instruction set, size by size.
     #[must_use]
     pub fn speedups(&self) -> Vec<((u32, u32), f64)> {
         let rate = |size: (u32, u32), threads: usize| {
-            let of_size = self.speeds.iter().filter(|s| (s.width, s.height) == size && s.what.starts_with("CPU"));
+            let of_size = self.speeds.iter().filter(|s| (s.width, s.height) == size && s.what.ends_with("batch"));
             of_size.filter(|s| s.threads == threads).map(|s| s.panoramas_per_s).next_back()
         };
         SIZES.into_iter().filter_map(|size| Some((size, rate(size, 2)? / rate(size, 1)?))).collect()
@@ -153,7 +154,10 @@ pub fn measure(effort: Effort, tell: &mut dyn FnMut(&Speed) -> Result<()>) -> Re
         for set in InstructionSet::ALL.into_iter().filter(|set| set.is_available()) {
             keep(bench.time(&format!("CPU, {set}"), &mut CpuRenderer::on(set)?, Way::One)?)?;
         }
-        keep(bench.time(&format!("CPU, {}", InstructionSet::best()), &mut CpuRenderer::new(), Way::Batch(2))?)?;
+        for threads in [1, 2] {
+            let what = format!("CPU, {}, batch", InstructionSet::best());
+            keep(bench.time(&what, &mut CpuRenderer::new(), Way::Batch(threads))?)?;
+        }
         if let Some(gpu) = &mut gpu {
             keep(bench.time("GPU", gpu, Way::Batch(1))?)?;
         }
@@ -228,8 +232,10 @@ impl Bench<'_> {
         let (width, height) = self.size;
         let projection = self.world.projection_of_size(width, height);
         let bodies = self.world.body_poses();
-        // A batch long enough that its ends do not count, and short enough to be taken several times.
-        let mut length = 2 * threads;
+        // A batch long enough that its ends do not count, nor the pages that it asks the system for, and short enough to be taken
+        // several times.
+        let share = if matches!(way, Way::One) { 0.02 } else { 0.25 };
+        let mut length = 4;
         let mut out = Panorama::empty();
         let (mut rates, mut fills) = (Vec::new(), vec![self.limit.time()]);
         let began = Instant::now();
@@ -245,7 +251,7 @@ impl Bench<'_> {
                 Way::Batch(_) => renderer.render_batch(self.scene, &views, &mut look),
             })?;
             let elapsed = started.elapsed().as_secs_f64();
-            if elapsed < 0.02 * self.effort.seconds {
+            if elapsed < share * self.effort.seconds {
                 length *= 2; // still finding out
                 continue;
             }

@@ -300,4 +300,3 @@ fn weakness(feature: &Feature) -> u32 {
 fn place(feature: &Feature) -> (u32, u32, u32) {
     ((feature.x + 0.0).to_bits(), feature.y.to_bits(), feature.sigma.to_bits())
 }
-
