@@ -232,9 +232,8 @@ impl Bench<'_> {
         let (width, height) = self.size;
         let projection = self.world.projection_of_size(width, height);
         let bodies = self.world.body_poses();
-        // A batch long enough that its ends do not count, nor the pages that it asks the system for, and short enough to be taken
-        // several times.
-        let share = if matches!(way, Way::One) { 0.02 } else { 0.25 };
+        // A batch long enough that its ends do not count, nor the pages that it asks the system for, nor caches that were emptied by
+        // filling memory.
         let mut length = 4;
         let mut out = Panorama::empty();
         let (mut rates, mut fills) = (Vec::new(), vec![self.limit.time()]);
@@ -251,7 +250,7 @@ impl Bench<'_> {
                 Way::Batch(_) => renderer.render_batch(self.scene, &views, &mut look),
             })?;
             let elapsed = started.elapsed().as_secs_f64();
-            if elapsed < share * self.effort.seconds {
+            if elapsed < 0.2 * self.effort.seconds {
                 length *= 2; // still finding out
                 continue;
             }
