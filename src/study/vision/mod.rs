@@ -162,7 +162,7 @@ pub fn run(
                         take(&Pair { world, place: Some(*place), distance_m: level, shot })?;
                     }
                 }
-                let score = studio.score(axis, level, shots, &mut times_ms);
+                let score = studio.score(axis, level, shots, &mut times_ms)?;
                 if axis == Axis::Distance {
                     study.errors_rad[k].1.extend_from_slice(&score.errors_rad);
                 }
@@ -272,7 +272,7 @@ impl<'a> Studio<'a> {
         shots.collect()
     }
 
-    fn score(&self, axis: Axis, level: f64, shots: Vec<(usize, Shot)>, times_ms: &mut Vec<f64>) -> Score {
+    fn score(&self, axis: Axis, level: f64, shots: Vec<(usize, Shot)>, times_ms: &mut Vec<f64>) -> Result<Score> {
         let condition = Condition::at(axis, level);
         let seed = Seed(self.settings.seed);
         let stream = |place: &str| seed.stream(&format!("vision/{}/{level}/{place}", axis.name()));
@@ -280,26 +280,43 @@ impl<'a> Studio<'a> {
         if axis == Axis::Noise {
             condition.apply(&mut home, &mut stream("home"));
         }
-        let eyes = || Eyes::new(&self.settings.extractor, &home);
-        let scores: Vec<(Score, f64)> = shots
-            .into_par_iter()
-            .map_init(eyes, |eyes, (place, mut shot)| {
+        let look = |mut shots: Vec<(usize, Shot)>| -> Vec<(Score, f64)> {
+            let mut eyes = Eyes::new(&self.settings.extractor, &home);
+            let score = |(place, shot): &mut (usize, Shot)| {
                 condition.apply(&mut shot.panorama, &mut stream(&place.to_string()));
                 let mut score = Score::default();
-                score.add_objects(&mut eyes.objects, &eyes.snapshot, &self.home, &shot);
+                score.add_objects(&mut eyes.objects, &eyes.snapshot, &self.home, shot);
                 let start = Instant::now();
                 eyes.features.observe(&shot.panorama);
                 let time_ms = 1e3 * start.elapsed().as_secs_f64();
-                score.add(&eyes.features, &self.home, &shot);
+                score.add(&eyes.features, &self.home, shot);
                 (score, time_ms)
-            })
-            .collect();
+            };
+            shots.iter_mut().map(score).collect()
+        };
+        // A pool of one for each part, so that a panorama is timed on one thread and nothing else is done meanwhile.
+        let size = shots.len().div_ceil(rayon::current_num_threads()).max(1);
+        let mut shots = shots.into_iter();
+        let parts = std::iter::from_fn(|| Some(shots.by_ref().take(size).collect::<Vec<_>>()).filter(|part| !part.is_empty()));
+        let parts: Vec<_> = parts.collect();
+        let scores = std::thread::scope(|scope| {
+            let worker = |part| {
+                let look = &look;
+                scope.spawn(move || {
+                    let alone = rayon::ThreadPoolBuilder::new().num_threads(1).build();
+                    alone.map_err(|e| Error::Threads(e.to_string())).map(|pool| pool.install(|| look(part)))
+                })
+            };
+            let workers: Vec<_> = parts.into_iter().map(worker).collect();
+            let scores = workers.into_iter().map(|w| w.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)));
+            scores.collect::<Result<Vec<_>>>()
+        })?;
         let mut sum = Score::default();
-        for (score, time_ms) in scores {
+        for (score, time_ms) in scores.into_iter().flatten() {
             sum.join(score);
             times_ms.push(time_ms);
         }
-        sum
+        Ok(sum)
     }
 }
 
