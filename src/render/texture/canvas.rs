@@ -183,10 +183,12 @@ impl Canvas {
                     line.as_flattened_mut().iter_mut().zip(add).for_each(|(sum, x)| *sum += share * x);
                 }
                 for (out, covered) in out.iter_mut().zip(&shares) {
-                    for &(v, share) in covered {
-                        let colour = line[v];
-                        *out = std::array::from_fn(|c| out[c] + share * colour[c]);
-                    }
+                    let add = |sum: Colour, &(v, share): &(usize, f32)| -> Colour {
+                        let colour: Colour = line[v];
+                        std::array::from_fn(|c| sum[c] + share * colour[c])
+                    };
+                    // Written without being read: fresh memory that is read first is asked of the system twice.
+                    *out = covered.iter().fold([0.0; 3], add);
                 }
             },
         );
