@@ -261,23 +261,26 @@ fn pack(surfaces: &[Surface<'_>]) -> (Vec<Material>, Vec<u32>) {
         })
         .collect();
     let fineness = texture::fineness(distinct.iter().map(|s| s.texture));
-    let baked: Vec<texture::Baked> = distinct.par_iter().zip(fineness).map(|(s, f)| texture::bake(s, f)).collect();
-    let mut atlas = huge_pages::with_capacity(baked.iter().map(|b| b.texels.len()).sum::<usize>() + PADDING);
-    let packed: Vec<Material> = baked
-        .iter()
-        .zip(&distinct)
-        .map(|(b, s)| {
-            let mut base = atlas.len() as u32;
-            atlas.extend_from_slice(&b.texels);
-            let tiles_per_m = [0, 1].map(|axis| (1.0 / (s.texture.period_m[axis] * f64::from(b.periods[axis]))) as f32);
-            let mut levels = [MipLevel { base, size: 1 }; LEVELS];
-            for (level, &size) in levels.iter_mut().zip(&b.sizes) {
-                *level = MipLevel { base, size };
-                base += level.pitch() * level.pitch();
-            }
-            Material { tiles_per_m, last_level: b.sizes.len() as u32 - 1, padding: 0, levels }
-        })
-        .collect();
-    atlas.resize(atlas.len() + PADDING, 0);
+    let lengths: Vec<usize> = fineness.iter().map(|&f| texture::texels(f)).collect();
+    let mut atlas = huge_pages::zeroed(lengths.iter().sum::<usize>() + PADDING);
+    let (mut places, mut rest) = (Vec::with_capacity(distinct.len()), atlas.as_mut_slice());
+    for &length in &lengths {
+        let (place, after) = rest.split_at_mut(length);
+        places.push(place);
+        rest = after;
+    }
+    let bake = |((surface, fineness), place): ((&Surface<'_>, u32), &mut [u32])| texture::bake(surface, fineness, place);
+    let baked: Vec<texture::Baked> = distinct.par_iter().zip(fineness).zip(places).map(bake).collect();
+    let mut base = 0;
+    let mut packed: Vec<Material> = Vec::with_capacity(distinct.len());
+    for (b, s) in baked.iter().zip(&distinct) {
+        let tiles_per_m = [0, 1].map(|axis| (1.0 / (s.texture.period_m[axis] * f64::from(b.periods[axis]))) as f32);
+        let mut levels = [MipLevel { base, size: 1 }; LEVELS];
+        for (level, &size) in levels.iter_mut().zip(&b.sizes) {
+            *level = MipLevel { base, size };
+            base += level.pitch() * level.pitch();
+        }
+        packed.push(Material { tiles_per_m, last_level: b.sizes.len() as u32 - 1, padding: 0, levels });
+    }
     (which.into_iter().map(|k| packed[k]).collect(), atlas)
 }

@@ -195,20 +195,20 @@ impl Canvas {
         Self { size, pixels, ..*self }
     }
 
-    /// Appends the pixels, packed with red in the lowest byte, with a border of one pixel in which the tile goes on.
-    pub fn append_texels(&self, out: &mut Vec<u32>) {
+    /// Writes the pixels, packed with red in the lowest byte, with a border of one pixel in which the tile goes on.
+    pub fn write_texels(&self, out: &mut [u32]) {
         let packed = |colour: &Colour| {
             let [r, g, b] = colour.map(|x| (x + 0.5) as u32);
             r | g << 8 | b << 16 | 0xff00_0000
         };
-        let mut append = |line: &[Colour]| {
-            out.push(packed(&line[self.size - 1]));
-            out.extend(line.iter().map(packed));
-            out.push(packed(&line[0]));
-        };
-        append(&self.pixels[self.size * (self.size - 1)..]);
-        self.pixels.chunks_exact(self.size).for_each(&mut append);
-        append(&self.pixels[..self.size]);
+        let pitch = self.size + 2;
+        debug_assert_eq!(out.len(), pitch * pitch);
+        out.par_chunks_exact_mut(pitch).enumerate().for_each(|(k, out)| {
+            let line = &self.pixels[(k + self.size - 1) % self.size * self.size..][..self.size];
+            out[0] = packed(&line[self.size - 1]);
+            out[1..=self.size].iter_mut().zip(line).for_each(|(out, colour)| *out = packed(colour));
+            out[pitch - 1] = packed(&line[0]);
+        });
     }
 }
 

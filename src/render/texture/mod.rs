@@ -21,12 +21,10 @@ use super::scene::Surface;
 use crate::random::Seed;
 use crate::world::{Pattern, Texture, TextureFamily};
 
-/// A baked texture.
+/// What a baked texture consists of.
 pub(super) struct Baked {
     /// Texels along an edge of each level, the finest first, borders not counted.
     pub sizes: Vec<u32>,
-    /// All levels with their borders; red in the lowest byte.
-    pub texels: Vec<u32>,
     /// Periods of the texture that the tile covers along u and v.
     pub periods: [u32; 2],
 }
@@ -84,12 +82,13 @@ fn size(fineness: u32) -> u32 {
 }
 
 /// Texels of all levels of a tile, with their borders.
-fn texels(fineness: u32) -> usize {
+pub(super) fn texels(fineness: u32) -> usize {
     (0..=fineness).map(|f| (size(f) as usize + 2).pow(2)).sum()
 }
 
-/// Draws a texture in so many levels, less one.
-pub(super) fn bake(surface: &Surface<'_>, fineness: u32) -> Baked {
+/// Draws a texture in so many levels, less one, which lie one after the other in `out`, with their borders; red in the lowest byte.
+/// There must be room for [`texels()`] of them.
+pub(super) fn bake(surface: &Surface<'_>, fineness: u32, mut out: &mut [u32]) -> Baked {
     let texture = surface.texture;
     let log2_size = fineness.div_ceil(PER_OCTAVE);
     // Large tiles are drawn at their own resolution: what is beyond is seldom looked at so closely.
@@ -114,16 +113,17 @@ pub(super) fn bake(surface: &Surface<'_>, fineness: u32) -> Baked {
     }
     canvas.weaken(texture.contrast.clamp(0.0, 1.0) as f32);
     let sizes: Vec<u32> = (0..=fineness).rev().map(size).collect();
-    let mut all = Vec::with_capacity(texels(fineness));
     // Each level is made of the one an octave finer, those of the first octave of what was drawn.
     let mut octave = VecDeque::with_capacity(PER_OCTAVE as usize);
     for &size in &sizes {
         let source = if octave.len() == PER_OCTAVE as usize { octave.pop_front() } else { None };
         let level = source.as_ref().unwrap_or(&canvas).shrunk(size as usize);
-        level.append_texels(&mut all);
+        let (texels, rest) = out.split_at_mut((size as usize + 2).pow(2));
+        level.write_texels(texels);
+        out = rest;
         octave.push_back(level);
     }
-    Baked { sizes, texels: all, periods }
+    Baked { sizes, periods }
 }
 
 #[cfg(test)]
@@ -134,25 +134,26 @@ mod tests {
         Texture { pattern: Pattern::Family(family), colour: [150, 120, 90], period_m: [period_m; 2], contrast: 0.6, seed: 7 }
     }
 
-    fn baked(texture: &Texture, log2_size: u32) -> Baked {
-        bake(&Surface::new(texture, false), PER_OCTAVE * log2_size)
+    fn baked(surface: &Surface<'_>, fineness: u32) -> (Baked, Vec<u32>) {
+        let mut all = vec![0; texels(fineness)];
+        (bake(surface, fineness, &mut all), all)
     }
 
     /// The finest level without its border.
-    fn finest(baked: &Baked) -> Vec<u32> {
+    fn finest(surface: &Surface<'_>, log2_size: u32) -> Vec<u32> {
+        let (baked, texels) = baked(surface, PER_OCTAVE * log2_size);
         let size = baked.sizes[0] as usize;
-        baked.texels.chunks(size + 2).skip(1).take(size).flat_map(|line| line[1..=size].to_vec()).collect()
+        texels.chunks(size + 2).skip(1).take(size).flat_map(|line| line[1..=size].to_vec()).collect()
     }
 
     #[test]
     fn bands_do_not_depend_on_u_and_plain_is_one_texel() {
-        let bands = baked(&texture(TextureFamily::Bands, 4.0), 6);
-        let finest = finest(&bands);
+        let finest = finest(&Surface::new(&texture(TextureFamily::Bands, 4.0), false), 6);
         assert!(finest.chunks(64).all(|line| line == &finest[..64]));
         assert!(finest[..64].iter().any(|t| *t != finest[0]));
         let plain = texture(TextureFamily::Plain, 4.0);
-        let plain = baked(&plain, fineness([&plain].into_iter())[0]);
-        assert_eq!((plain.sizes, plain.texels), (vec![1], vec![0xff5a_7896; 9]));
+        let (plain, texels) = baked(&Surface::new(&plain, false), fineness([&plain].into_iter())[0]);
+        assert_eq!((plain.sizes, texels), (vec![1], vec![0xff5a_7896; 9]));
     }
 
     #[test]
@@ -167,7 +168,8 @@ mod tests {
             let sizes = sizes(&vec![16.0; count]);
             assert!(sizes.iter().map(|n| texels(*n)).sum::<usize>() <= ATLAS_TEXELS, "{count}");
         }
-        assert_eq!(baked(&texture(TextureFamily::Noise, 7.0), 10).texels.len(), texels(40));
+        // All that was asked for is written: no texel is transparent.
+        assert!(baked(&Surface::new(&texture(TextureFamily::Noise, 7.0), false), 40).1.iter().all(|t| t >> 24 == 0xff));
     }
 
     #[test]
@@ -178,7 +180,7 @@ mod tests {
         let image = Texture { pattern: Pattern::Image(picture), contrast: 1.0, ..texture(TextureFamily::Plain, 1.0) };
         // Texels run up each line of u.
         let (white, black, base) = (0xffff_ffff, 0xff00_0000, 0xff5a_7896);
-        let seen = |mirrored: bool| finest(&bake(&Surface::new(&image, mirrored), PER_OCTAVE));
+        let seen = |mirrored: bool| finest(&Surface::new(&image, mirrored), 1);
         assert_eq!(seen(false), [white, black, base, black]);
         assert_eq!(seen(true), [base, black, white, black]);
         let long = crate::world::Picture { width: 5, height: 2, rgba: vec![0; 40] };
