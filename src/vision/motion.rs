@@ -62,7 +62,7 @@ pub(super) struct Fit {
 impl Fit {
     /// Whether the match may be right.
     pub fn is_good(&self) -> bool {
-        self.possible && self.chi2 < CHI2_LIMIT
+        self.possible & (self.chi2 < CHI2_LIMIT)
     }
 }
 
@@ -86,7 +86,7 @@ const REACH: f64 = 3.0;
 /// The same squared: the limit of `Fit::chi2`.
 const CHI2_LIMIT: f64 = REACH * REACH;
 
-/// Matches judged before asking whether to go on.
+/// Matches judged together, before asking whether to go on.
 const JUDGED_AT_ONCE: usize = 16;
 
 /// The sines and cosines that (1) is made of.
@@ -100,7 +100,7 @@ struct Angles {
 }
 
 impl Frame {
-    #[inline]
+    #[inline(always)]
     fn angles(&self, home: &Sight, now: &Sight) -> Angles {
         let phi = Vector2::new(
             self.turn.x * now.unit.x - self.turn.y * now.unit.y,
@@ -114,7 +114,7 @@ impl Frame {
     }
 
     /// Residual of (1) and its variance.
-    #[inline]
+    #[inline(always)]
     fn residual(angles: &Angles, home: &Sight, now: &Sight) -> (f64, f64) {
         let ((a, a_cos), (b, b_cos)) = (angles.home, angles.now);
         let error = now.tan * a - home.tan * b;
@@ -126,7 +126,7 @@ impl Frame {
 
     /// How a match fits this motion, and how it fits the opposite step with the same turn: residual and scale are the same,
     /// the sense is not.
-    #[inline]
+    #[inline(always)]
     fn fit_both(&self, home: &Sight, now: &Sight) -> [Fit; 2] {
         let angles = self.angles(home, now);
         let (error, variance) = Self::residual(&angles, home, now);
@@ -134,10 +134,11 @@ impl Frame {
         let (a, b) = (angles.home.0, angles.now.0);
         // r*/r = sin(phi - d) / sin(a* - d), and that is also the ratio of the scales.
         let (near, far) = (now.scale * a.abs(), home.scale * b.abs());
-        let scale_fits = near < SCALE_SLACK * far + 0.1 * home.scale && far < SCALE_SLACK * near + 0.1 * now.scale;
+        // No short cuts: many matches are judged at once.
+        let scale_fits = (near < SCALE_SLACK * far + 0.1 * home.scale) & (far < SCALE_SLACK * near + 0.1 * now.scale);
         let slack = REACH * (home.variance + now.variance).sqrt();
         let side = if a < 0.0 { -1.0 } else { 1.0 };
-        [side, -side].map(|side| Fit { chi2, possible: scale_fits && angles.parallax * side > -slack && b * side > -slack })
+        [side, -side].map(|side| Fit { chi2, possible: scale_fits & (angles.parallax * side > -slack) & (b * side > -slack) })
     }
 
     /// How a match fits this motion.
@@ -154,12 +155,48 @@ pub(super) struct Pair {
     pub now: Sight,
 }
 
+/// Some matches, number by number, as vector instructions take them.
+#[derive(Debug, Clone, Copy, Default)]
+struct Lanes {
+    /// Of home and of now: x and y of the azimuth, tangent of elevation, variance, scale. Where there is no match all are 0, and
+    /// what has no scale fits no motion.
+    numbers: [[[f64; JUDGED_AT_ONCE]; 5]; 2],
+}
+
+impl Lanes {
+    fn of(pairs: &[Pair]) -> Vec<Self> {
+        let together = |block: &[Pair]| {
+            let mut lanes = Self::default();
+            for (i, pair) in block.iter().enumerate() {
+                for (numbers, s) in lanes.numbers.iter_mut().zip([&pair.home, &pair.now]) {
+                    for (number, value) in numbers.iter_mut().zip([s.unit.x, s.unit.y, s.tan, s.variance, s.scale]) {
+                        number[i] = value;
+                    }
+                }
+            }
+            lanes
+        };
+        pairs.chunks(JUDGED_AT_ONCE).map(together).collect()
+    }
+
+    #[inline(always)]
+    fn sights(&self, i: usize) -> [Sight; 2] {
+        self.numbers.each_ref().map(|[x, y, tan, variance, scale]| Sight {
+            unit: Vector2::new(x[i], y[i]),
+            tan: tan[i],
+            variance: variance[i],
+            scale: scale[i],
+        })
+    }
+}
+
 /// Finds the motion that explains most of `pairs`, which are ordered best first. `None` if there are fewer than
 /// three or nothing explains three.
 pub(super) fn estimate(pairs: &[Pair], draws: usize, seed: Seed) -> Option<PlanarMotion> {
     if pairs.len() < 3 {
         return None;
     }
+    let lanes = Lanes::of(pairs);
     let mut stream = seed.stream("vision/motion");
     let mut best: Option<(f64, PlanarMotion)> = None;
     let mut needed = draws;
@@ -175,8 +212,8 @@ pub(super) fn estimate(pairs: &[Pair], draws: usize, seed: Seed) -> Option<Plana
         }
         for motion in solve(&pairs[i], &pairs[j]).into_iter().flatten() {
             let least = best.map_or(0.0, |(score, _)| score);
-            let Some((score, motion)) = judge(pairs, motion, least) else { continue };
-            let better = judge(pairs, polish(pairs, motion), score).unwrap_or((score, motion));
+            let Some((score, motion)) = judge(&lanes, pairs.len(), motion, least) else { continue };
+            let better = judge(&lanes, pairs.len(), polish(pairs, motion), score).unwrap_or((score, motion));
             // Enough draws for several pairs of right matches, whose noise still varies.
             let right = better.0 / pairs.len() as f64;
             needed = ((12.0 / (right * right)) as usize).clamp(20, draws);
@@ -221,21 +258,26 @@ fn solve(first: &Pair, second: &Pair) -> [Option<PlanarMotion>; 2] {
     })
 }
 
-/// Support of a motion or of its opposite, whichever has more, and that motion; `None` as soon as it is certain that neither
-/// has more than `least`.
-fn judge(pairs: &[Pair], motion: PlanarMotion, least: f64) -> Option<(f64, PlanarMotion)> {
+/// Support of a motion or of its opposite among `count` matches, whichever has more, and that motion; `None` as soon as it is certain
+/// that neither has more than `least`.
+#[multiversion::multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
+fn judge(lanes: &[Lanes], count: usize, motion: PlanarMotion, least: f64) -> Option<(f64, PlanarMotion)> {
     let frame = motion.frame();
     let mut support = [0.0_f64; 2];
-    let mut left = pairs.len();
-    for block in pairs.chunks(JUDGED_AT_ONCE) {
-        for pair in block {
-            for (fit, support) in frame.fit_both(&pair.home, &pair.now).iter().zip(&mut support) {
-                if fit.is_good() {
-                    *support += 1.0 - fit.chi2 / CHI2_LIMIT;
-                }
-            }
+    let mut left = count;
+    for block in lanes {
+        let mut gains = [[0.0; JUDGED_AT_ONCE]; 2];
+        for i in 0..JUDGED_AT_ONCE {
+            let [home, now] = block.sights(i);
+            let [fit, opposite] = frame.fit_both(&home, &now);
+            let gain = 1.0 - fit.chi2 / CHI2_LIMIT;
+            gains[0][i] = if fit.is_good() { gain } else { 0.0 };
+            gains[1][i] = if opposite.is_good() { gain } else { 0.0 };
         }
-        left -= block.len();
+        for (support, gains) in support.iter_mut().zip(&gains) {
+            *support = gains.iter().fold(*support, |sum, gain| sum + gain);
+        }
+        left = left.saturating_sub(JUDGED_AT_ONCE);
         if support[0].max(support[1]) + left as f64 <= least {
             return None;
         }
