@@ -143,7 +143,9 @@ pub(super) fn apply(case: &mut Case, name: &str, value: &Value) -> Result<()> {
     }
     match name.split_once('.') {
         Some(("world", place)) if !place.is_empty() => case.draft.set(place, value),
-        Some(("filter", field)) => change(&mut case.setup.filter, field, value).map_err(refused),
+        Some(("filter", field)) if !OF_THE_ROBOT.contains(&name) => {
+            change(&mut case.setup.filter, field, value).map_err(refused)
+        }
         Some(("extractor", field)) => change(&mut case.setup.extractor, field, value).map_err(refused),
         _ => Err(Error::Invalid { what: "setting".into(), found: name.to_owned(), allowed: near(name) }),
     }
@@ -180,12 +182,16 @@ pub fn catalogue() -> Vec<(String, &'static str)> {
     all_names().into_iter().map(|name| (name.clone(), words(&name))).collect()
 }
 
+/// Fields of the filter that the robot's data sheet says, whatever they were set to: the world has them.
+const OF_THE_ROBOT: [&str; 2] = ["filter.track_m", "filter.camera_offset_m"];
+
 fn all_names() -> Vec<String> {
     let fields = |prefix: &str, settings: serde_json::Value| -> Vec<String> {
         settings.as_object().into_iter().flatten().map(|(key, _)| format!("{prefix}.{key}")).collect()
     };
     let mut names: Vec<String> = SETTINGS.iter().map(|(name, ..)| (*name).to_owned()).collect();
     names.extend(fields("filter", serde_json::to_value(FilterSettings::default()).unwrap_or_default()));
+    names.retain(|name| !OF_THE_ROBOT.contains(&name.as_str()));
     names.extend(fields("extractor", serde_json::to_value(ExtractorSettings::default()).unwrap_or_default()));
     names.extend(World::field_names().into_iter().map(|place| format!("world.{place}")));
     names
@@ -338,6 +344,7 @@ mod tests {
         assert!(told("method", Value::Text("magic".into())).contains("tron-daniilidis-compass"));
         assert!(told("filter.gait", Value::Real(1.0)).contains("gate"));
         assert!(told("filter.gate", Value::Text("wide".into())).contains("wide"));
+        assert!(told("filter.track_m", Value::Real(0.3)).contains("world.robot.track_m"));
         assert!(told("light", Value::Text("dusk".into())).contains("evening"));
         assert!(told("walkers", Value::Whole(12)).contains("0 to 9"));
         assert_eq!((distance("slip", "slipper"), distance("kitten", "sitting")), (3, 3));
