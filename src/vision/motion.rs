@@ -266,15 +266,15 @@ fn judge(lanes: &[Lanes], count: usize, motion: PlanarMotion, least: f64) -> Opt
     let mut support = [0.0_f64; 2];
     let mut left = count;
     for block in lanes {
-        let mut gains = [[0.0; JUDGED_AT_ONCE]; 2];
-        for i in 0..JUDGED_AT_ONCE {
+        let (mut gains, mut opposite_gains) = ([0.0; JUDGED_AT_ONCE], [0.0; JUDGED_AT_ONCE]);
+        for (i, (gain, opposite_gain)) in gains.iter_mut().zip(&mut opposite_gains).enumerate() {
             let [home, now] = block.sights(i);
             let [fit, opposite] = frame.fit_both(&home, &now);
-            let gain = 1.0 - fit.chi2 / CHI2_LIMIT;
-            gains[0][i] = if fit.is_good() { gain } else { 0.0 };
-            gains[1][i] = if opposite.is_good() { gain } else { 0.0 };
+            let full = 1.0 - fit.chi2 / CHI2_LIMIT;
+            *gain = if fit.is_good() { full } else { 0.0 };
+            *opposite_gain = if opposite.is_good() { full } else { 0.0 };
         }
-        for (support, gains) in support.iter_mut().zip(&gains) {
+        for (support, gains) in support.iter_mut().zip([gains, opposite_gains]) {
             *support = gains.iter().fold(*support, |sum, gain| sum + gain);
         }
         left = left.saturating_sub(JUDGED_AT_ONCE);
