@@ -279,3 +279,12 @@ fn observations_repeat_and_are_in_order() {
     assert!(first.windows(2).all(|w| w[0].id < w[1].id));
     assert!(first.iter().all(|b| b.sd_rad > 0.0 && b.azimuth_rad.abs() <= std::f64::consts::PI));
 }
+
+#[test]
+fn the_smallest_pictures_show_nothing() {
+    for (width, height) in [(1, 1), (64, 1), (64, 2), (1, 64), (3, 3)] {
+        let panorama = Panorama::black(Projection::new(width, height));
+        let mut extractor = Extractor::new(ExtractorSettings::default(), &panorama);
+        assert!(extractor.home_snapshot().bearings.is_empty() && extractor.observe(&panorama).is_empty(), "{width} x {height}");
+    }
+}

@@ -1,6 +1,6 @@
 //! Threads for a single run.
 
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use anyhow::{Context as _, Result};
 use rayon::Yield;
@@ -15,12 +15,16 @@ const MOST: usize = 4;
 pub fn awake<T: Send>(work: impl FnOnce() -> T + Send) -> Result<T> {
     let threads = rayon::current_num_threads().min(MOST);
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().context("cannot start worker threads")?;
-    let done = AtomicBool::new(false);
+    let (awake, done) = (AtomicUsize::new(1), AtomicBool::new(false));
     let result = pool.scope(|scope| {
         let worker = rayon::current_thread_index();
-        let done = &done;
+        let (awake, done) = (&awake, &done);
         scope.spawn_broadcast(move |_, context| {
-            while Some(context.index()) != worker && !done.load(Ordering::Relaxed) {
+            if Some(context.index()) == worker {
+                return;
+            }
+            awake.fetch_add(1, Ordering::Relaxed);
+            while !done.load(Ordering::Relaxed) {
                 if rayon::yield_now() != Some(Yield::Executed) {
                     std::thread::yield_now();
                 }
@@ -28,6 +32,10 @@ pub fn awake<T: Send>(work: impl FnOnce() -> T + Send) -> Result<T> {
         });
         // Also when the work panics, or the scope would wait for the others, and they for it.
         let _ending = Ending(done);
+        // A thread that got work before it got here would come here from within that work, and never end it.
+        while awake.load(Ordering::Relaxed) < threads {
+            std::thread::yield_now();
+        }
         work()
     });
     Ok(result)
@@ -45,15 +53,34 @@ impl Drop for Ending<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::collections::BTreeSet;
+    use std::sync::Barrier;
+
     use rayon::prelude::*;
 
+    /// Each piece waits for as many others as there are threads: one thread alone would never end.
     #[test]
-    fn work_is_shared_and_what_it_gives_comes_back() {
-        let sum = awake(|| {
-            assert!(rayon::current_num_threads() <= MOST);
-            (0..1000_u32).into_par_iter().with_max_len(1).sum::<u32>()
+    fn work_is_shared_by_all_threads() {
+        let threads = awake(|| {
+            let (count, together) = (rayon::current_num_threads(), Barrier::new(rayon::current_num_threads()));
+            let piece = |_| {
+                together.wait();
+                rayon::current_thread_index()
+            };
+            let seen: BTreeSet<_> = (0..count as u32).into_par_iter().with_max_len(1).map(piece).collect();
+            (count, seen.len())
         });
-        assert_eq!(sum.unwrap(), 499_500);
+        let (count, seen) = threads.unwrap();
+        assert!(seen == count && count <= MOST, "{seen} of {count}");
+    }
+
+    /// Forks at once, many times over: no thread may be caught below its own work.
+    #[test]
+    fn forks_may_begin_at_once() {
+        for _ in 0..200 {
+            let sum = awake(|| (0..64_u32).into_par_iter().with_max_len(1).map(|k| k % 7).sum::<u32>());
+            assert_eq!(sum.unwrap(), (0..64_u32).map(|k| k % 7).sum::<u32>());
+        }
     }
 
     #[test]

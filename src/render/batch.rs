@@ -9,16 +9,16 @@ use crate::panorama::Panorama;
 
 /// Bytes of a pixel of a [`Panorama`]: colour, range and instance.
 const PIXEL_BYTES: usize = 10;
-/// Bytes of a group, where the pictures are so small that more than one a thread fits: enough of them that no thread waits long at
-/// the end of a group, and no more than stay near the processor: with four times as many, 1440 x 180 took a third longer.
-const GROUP_BYTES: usize = 8 << 20;
+/// Bytes of a group for each thread, where the pictures are so small that more than one fits: enough of them that no thread waits
+/// long at the end of a group, and no more than stay near the processor: with four times as many, 1440 x 180 took a third longer.
+const GROUP_BYTES: usize = 4 << 20;
 /// Most pictures of a group for each thread: more would only let the first result wait longer.
 const MOST_PER_THREAD: usize = 16;
 
 /// Pictures of a group, when the largest of a batch has `pixels`: as many for each thread.
 fn group_length(pixels: usize) -> usize {
     let threads = rayon::current_num_threads();
-    (GROUP_BYTES / (PIXEL_BYTES * pixels.max(1)) / threads).clamp(1, MOST_PER_THREAD) * threads
+    (GROUP_BYTES / (PIXEL_BYTES * pixels.max(1))).clamp(1, MOST_PER_THREAD) * threads
 }
 
 /// The driver behind [`Renderer::render_batch`].

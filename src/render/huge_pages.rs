@@ -4,8 +4,8 @@
 //! every one of them, which takes as long as shading it, twice so in a virtual machine. Linux gives pages of 2 MiB to whoever
 //! asks; on most systems only then. It is advice: nothing depends on its being taken.
 
-/// So many texels of 0, on large pages where the system has some. Memory is not touched before the first texel is written, by
-/// whichever thread that is.
+/// So many texels of 0, on large pages where the system has some. As much memory as textures take comes fresh from the system: it is
+/// not touched before the first texel is written, by whichever thread that is.
 pub(super) fn zeroed(texels: usize) -> Vec<u32> {
     let mut room = vec![0; texels];
     advise(&mut room);

@@ -63,15 +63,16 @@ fn consistency(bound: &Bound) -> String {
     let nees = settled.iter().filter(|row| within(row.nees, row.nees_band())).count();
     let nis = settled.iter().filter(|row| within(row.nis, row.nis_band())).count();
     let ([a, b], [c, d]) = (row.nees_band(), row.nis_band());
-    let mean = |value: fn(&BoundRow) -> Option<f64>| {
-        let values: Vec<f64> = settled.iter().filter_map(|row| value(row)).collect();
-        values.iter().sum::<f64>() / values.len() as f64
+    let mean = |value: fn(&BoundRow) -> Option<f64>, digits: usize| {
+        let values: Vec<f64> = settled.iter().filter_map(|row| value(row).filter(|v| v.is_finite())).collect();
+        let mean = values.iter().sum::<f64>() / values.len() as f64;
+        if values.is_empty() { "-".to_owned() } else { format!("{mean:.digits$}") }
     };
-    let (mean_nees, mean_nis) = (mean(|row| row.nees), mean(|row| row.nis));
+    let (mean_nees, mean_nis) = (mean(|row| row.nees, 2), mean(|row| row.nis, 3));
     format!(
         "\n95 % bands of a consistent filter over {all} runs: NEES {a:.2} to {b:.2}, NIS a bearing {c:.3} to {d:.3} at the end.\n\
          Of {} steps after all runs have an estimate, NEES is in its band in {nees}, NIS in {nis}; their means over these\n\
-         steps are {mean_nees:.2} (3 is consistent) and {mean_nis:.3} (1 is).\n",
+         steps are {mean_nees} (3 is consistent) and {mean_nis} (1 is).\n",
         settled.len()
     )
 }

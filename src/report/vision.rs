@@ -199,7 +199,7 @@ pub fn table(study: &VisionStudy) -> String {
             number(c.error_sd.map(|s| s.q95), 2),
         );
     }
-    let _ = writeln!(text, "\n{:.2} ms an observation, median", study.observe_ms);
+    let _ = writeln!(text, "\n{:.2} ms an observation on one thread, median", study.observe_ms);
     text
 }
 

@@ -32,12 +32,12 @@ pub(super) struct Feature {
 /// picture only. Returns the strength below which no feature had a chance to be kept: 0 if none was too weak.
 pub(super) fn detect(pyramid: &Pyramid, criteria: &Criteria, features: &mut Vec<Feature>) -> f32 {
     let layers = 2 * pyramid.octaves.len();
-    // Each thread scans the rows that it made, which lie in its own cache.
+    // Cut as the images were when they were made, so that a thread finds most of what it reads in its own cache.
     let parts = rayon::current_num_threads();
     *features = shared(parts, |some| {
         let (mut scratch, mut features) = (Scratch::default(), Vec::new());
         for layer in 0..layers - 1 {
-            let rows = pyramid.octaves[layer / 2].difference[layer % 2].height - 2;
+            let rows = pyramid.octaves[layer / 2].difference[layer % 2].height.saturating_sub(2);
             let rows = 1 + rows * some.start / parts..1 + rows * some.end / parts;
             scan(pyramid, layer, rows, criteria, &mut scratch, &mut features);
         }
@@ -295,8 +295,9 @@ fn weakness(feature: &Feature) -> u32 {
     !feature.response.abs().to_bits()
 }
 
-/// Orders features by column, then by row and scale. From 0 on the bits of floats are in their order; adding 0 takes away the sign
+/// Orders features by column, then by row, scale and layer. From 0 on the bits of floats are in their order; adding 0 takes away the sign
 /// of -0.
-fn place(feature: &Feature) -> (u32, u32, u32) {
-    ((feature.x + 0.0).to_bits(), feature.y.to_bits(), feature.sigma.to_bits())
+fn place(feature: &Feature) -> (u32, u32, u32, usize) {
+    let layer = 2 * feature.octave + feature.level;
+    ((feature.x + 0.0).to_bits(), feature.y.to_bits(), feature.sigma.to_bits(), layer)
 }

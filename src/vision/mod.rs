@@ -381,7 +381,7 @@ impl Extractor {
     }
 }
 
-/// Pieces of work for each thread: more than one, for they take unequal time.
+/// Most pieces of work for each thread: more than one, for they take unequal time.
 const PIECES: usize = 8;
 
 /// What `work` makes of the numbers from 0 to `count`, in their order, by all threads of the pool.

@@ -106,7 +106,7 @@ pub struct VisionStudy {
     pub size_px: [u32; 2],
     /// Seed of walkers, noise and what hides.
     pub seed: u64,
-    /// Median time of one observation on this machine, ms: features, matches and check. Differs from run to run.
+    /// Median time of one observation on one thread of this machine, ms: features, matches and check. Differs from run to run.
     pub observe_ms: f64,
     /// Version of this program.
     pub version: &'static str,
@@ -294,7 +294,7 @@ impl<'a> Studio<'a> {
             };
             shots.iter_mut().map(score).collect()
         };
-        // A pool of one for each part, so that a panorama is timed on one thread and nothing else is done meanwhile.
+        // A pool of one for each part, so that a panorama is timed on one thread, which does nothing else meanwhile.
         let size = shots.len().div_ceil(rayon::current_num_threads()).max(1);
         let mut shots = shots.into_iter();
         let parts = std::iter::from_fn(|| Some(shots.by_ref().take(size).collect::<Vec<_>>()).filter(|part| !part.is_empty()));
