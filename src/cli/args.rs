@@ -288,6 +288,9 @@ pub struct BoundArgs {
     /// Noise of odometry as a share of speed and yaw rate, in each step anew [default: 0.04]
     #[arg(long, value_name = "SHARE", allow_negative_numbers = true, value_parser = share)]
     pub noise_odometry: Option<f64>,
+    /// Runs whose mean NEES and NIS are held against their 95 % bands, group by group [default: all together]
+    #[arg(long, value_name = "N")]
+    pub group: Option<usize>,
     /// Time between rows of the table, s; `--json` has all steps
     #[arg(long, value_name = "S", default_value = "0.5", allow_negative_numbers = true, value_parser = positive)]
     pub every_s: f64,

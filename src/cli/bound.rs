@@ -19,6 +19,7 @@ pub fn run(args: &BoundArgs, context: &Context) -> Result<Verdict> {
         start: args.start.clone(),
         bearing_sd_rad: args.noise_deg.map_or(usual.bearing_sd_rad, f64::to_radians),
         odometry_share: args.noise_odometry.unwrap_or(usual.odometry_share),
+        group: args.group,
     };
     let bar = context.progress(Some(args.seeds.end() - args.seeds.start() + 1))?;
     bar.tick();

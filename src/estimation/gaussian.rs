@@ -46,6 +46,16 @@ impl SparseRow {
 /// bearing to something 0.3 m away would differ by 1e-5 rad.
 const SETTLED: f64 = 1e-3;
 
+/// Where the measurements of an update are linearised for the covariance.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum CovarianceAt {
+    /// At the prior mean, about where earlier measurements were. Measurements that are linearised in different places claim to tell
+    /// what they cannot (Huang, Mourikis and Roumeliotis, 2010).
+    Prior,
+    /// At the best estimate: for priors so wide that their mean means little.
+    Posterior,
+}
+
 /// A scalar measurement, linearised.
 #[derive(Debug, Clone, Copy)]
 pub struct Linearised {
@@ -159,7 +169,7 @@ impl Gaussian {
     }
 
     /// Iterated measurement update (Gauss-Newton on the posterior): `linearise` is called with the current iterate and gives
-    /// the same measurements each time, linearised there. Returns the normalised innovation squared of the whole batch at the
+    /// the same measurements each time, linearised there; `covariance_at` says which of them shrink the covariance. Returns the normalised innovation squared of the whole batch at the
     /// prior mean.
     ///
     /// # Errors
@@ -169,17 +179,21 @@ impl Gaussian {
     pub fn update_iterated(
         &mut self,
         iterations: usize,
+        covariance_at: CovarianceAt,
         joint_gate: impl Fn(usize) -> f64,
         mut linearise: impl FnMut(&DVector<f64>) -> Vec<Linearised>,
     ) -> Result<f64, Refused> {
         let prior = self.mean.clone();
         let mut iterate = prior.clone();
         let mut nis = None;
-        let mut factor = Factor::default();
-        for _ in 0..iterations.max(1) {
+        let (mut factor, mut at_prior) = (Factor::default(), None);
+        for iteration in 0..iterations.max(1) {
             let batch = linearise(&iterate);
             if batch.is_empty() {
                 return Ok(0.0);
+            }
+            if iteration == 1 && covariance_at == CovarianceAt::Prior {
+                at_prior = Some(std::mem::take(&mut factor));
             }
             factor.compute(&self.covariance, &batch).ok_or(Refused::Singular)?;
             let back = &prior - &iterate;
@@ -199,7 +213,7 @@ impl Gaussian {
                 break;
             }
         }
-        factor.downdate(&mut self.covariance);
+        at_prior.unwrap_or(factor).downdate(&mut self.covariance);
         self.mean = iterate;
         Ok(nis.unwrap_or(0.0))
     }
@@ -325,6 +339,30 @@ mod tests {
         h
     }
 
+    /// Of a measurement that is not linear, the mean is the iterated one and the covariance that of a single iteration.
+    #[test]
+    fn the_covariance_may_be_that_of_the_prior_place() {
+        let (prior, rows) = dense_belief(3, 2);
+        let update = |iterations, at| {
+            let mut belief = prior.clone();
+            let linearise = |x: &DVector<f64>| {
+                let stretched = |row: &SparseRow| {
+                    let along = row.dot(x.as_slice());
+                    let mut stretched = SparseRow::default();
+                    row.entries().iter().for_each(|&(c, v)| stretched.push(c, v * (1.0 + 0.02 * along)));
+                    Linearised { innovation: 1.0 - along - 0.01 * along * along, row: stretched, variance: 0.5 }
+                };
+                rows.iter().map(stretched).collect()
+            };
+            belief.update_iterated(iterations, at, |_| f64::INFINITY, linearise).unwrap();
+            belief
+        };
+        let (once, last) = (update(1, CovarianceAt::Prior), update(3, CovarianceAt::Posterior));
+        let both = update(3, CovarianceAt::Prior);
+        assert_eq!((&both.mean, &both.covariance), (&last.mean, &once.covariance));
+        assert!((&once.mean - &last.mean).amax() > SETTLED && once.covariance != last.covariance);
+    }
+
     /// A batch update equals the information form, worked out with dense inverses; for batches within one block, of several
     /// and with a rest.
     #[test]
@@ -339,6 +377,7 @@ mod tests {
             let nis = belief
                 .update_iterated(
                     3,
+                    CovarianceAt::Posterior,
                     |_| f64::INFINITY,
                     |x| {
                         let predicted = &h * x;
@@ -381,7 +420,7 @@ mod tests {
                     variance: 0.2,
                 };
                 let batch: Vec<_> = rows.iter().enumerate().filter(|(i, _)| Some(*i) != without).map(measured).collect();
-                (trial.update_iterated(1, |_| gate, |_| batch.clone()), trial)
+                (trial.update_iterated(1, CovarianceAt::Prior, |_| gate, |_| batch.clone()), trial)
             };
             let (all, after) = update(None, 10.0);
             assert_eq!(after.mean, belief.mean);

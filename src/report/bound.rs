@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use crate::study::bound::{Bound, BoundRow};
+use crate::study::bound::{Bound, BoundRow, nees_band};
 
 /// Bounds above these say only that nothing is known yet: R (m), theta and alpha (rad).
 const NOTHING_KNOWN: [f64; 3] = [10.0, 1.0, 1.0];
@@ -52,29 +52,38 @@ pub fn table(bound: &Bound, every_s: f64) -> String {
     text
 }
 
-/// How often NEES and NIS lie where a consistent filter's would, once all runs have an estimate, and their means. Steps share the
-/// noise of the home snapshot, so that with one draw of seeds many steps may lie outside together.
+/// Means of NEES and NIS once all runs have an estimate, and how often they lie where a consistent filter's would.
 fn consistency(bound: &Bound) -> String {
     let [first, last] = bound.seeds;
     let all = (last - first + 1) as usize;
     let settled: Vec<&BoundRow> = bound.rows.iter().filter(|row| row.runs == all).collect();
-    let Some(row) = settled.last() else { return String::new() };
-    let within = |value: Option<f64>, [low, high]: [f64; 2]| value.is_some_and(|v| (low..=high).contains(&v));
-    let nees = settled.iter().filter(|row| within(row.nees, row.nees_band())).count();
-    let nis = settled.iter().filter(|row| within(row.nis, row.nis_band())).count();
-    let ([a, b], [c, d]) = (row.nees_band(), row.nis_band());
-    let mean = |value: fn(&BoundRow) -> Option<f64>, digits: usize| {
-        let values: Vec<f64> = settled.iter().filter_map(|row| value(row).filter(|v| v.is_finite())).collect();
-        let mean = values.iter().sum::<f64>() / values.len() as f64;
-        if values.is_empty() { "-".to_owned() } else { format!("{mean:.digits$}") }
-    };
-    let (mean_nees, mean_nis) = (mean(|row| row.nees, 2), mean(|row| row.nis, 3));
-    format!(
-        "\n95 % bands of a consistent filter over {all} runs: NEES {a:.2} to {b:.2}, NIS a bearing {c:.3} to {d:.3} at the end.\n\
-         Of {} steps after all runs have an estimate, NEES is in its band in {nees}, NIS in {nis}; their means over these\n\
-         steps are {mean_nees} (3 is consistent) and {mean_nis} (1 is).\n",
-        settled.len()
-    )
+    let c = &bound.consistency;
+    let mut text = String::new();
+    if !settled.is_empty() {
+        let mean = |value: fn(&BoundRow) -> Option<f64>, digits: usize| {
+            let values: Vec<f64> = settled.iter().filter_map(|row| value(row).filter(|v| v.is_finite())).collect();
+            let mean = values.iter().sum::<f64>() / values.len() as f64;
+            if values.is_empty() { "-".to_owned() } else { format!("{mean:.digits$}") }
+        };
+        let (nees, nis) = (mean(|row| row.nees, 2), mean(|row| row.nis, 3));
+        let _ = write!(
+            text,
+            "\nOver the {} steps after all runs have an estimate, the mean NEES is {nees} (3 is consistent), NIS {nis} (1 is).\n",
+            settled.len()
+        );
+    }
+    if c.steps > 0 {
+        let [low, high] = nees_band(c.group);
+        let share = |steps: usize| 100.0 * steps as f64 / c.steps as f64;
+        let (nees, nis, groups) = (share(c.nees_in_band), share(c.nis_in_band), if c.groups == 1 { "group" } else { "groups" });
+        let _ = write!(
+            text,
+            "{} {groups} of {} runs: of {} means over a group at one step, NEES is in its 95 % band ({low:.2} to {high:.2}) in {} ({nees:.1} %),\n\
+             NIS in its own in {} ({nis:.1} %).\n",
+            c.groups, c.group, c.steps, c.nees_in_band, c.nis_in_band
+        );
+    }
+    text
 }
 
 fn line(row: &BoundRow) -> String {

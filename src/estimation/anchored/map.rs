@@ -13,7 +13,7 @@ use nalgebra::{DMatrix, DVector, Matrix2, Matrix3, Vector3};
 
 use super::FilterSettings;
 use super::motion::Motion;
-use crate::estimation::gaussian::{Gaussian, Linearised, Refused, SparseRow};
+use crate::estimation::gaussian::{CovarianceAt, Gaussian, Linearised, Refused, SparseRow};
 use crate::estimation::resection;
 use crate::geometry::{Pose, atan2, direction, sin_cos, wrap};
 use crate::observation::{Bearing, Estimate, LandmarkId};
@@ -296,7 +296,10 @@ impl Map {
         };
         if loosened && !members.is_empty() {
             let mut updated = self.clone();
-            let fine = updated.belief.update_iterated(iterations, |_| f64::INFINITY, |x| linearised(x, &members)).is_ok();
+            let fine = updated
+                .belief
+                .update_iterated(iterations, CovarianceAt::Posterior, |_| f64::INFINITY, |x| linearised(x, &members))
+                .is_ok();
             members.retain(|m| fine && updated.fits(m.landmark, &m.bearing, settings.gate));
         }
         // While ranges are unknown the linearisation at the prior mean is too poor for a verdict on all bearings together.
@@ -304,6 +307,8 @@ impl Map {
             true => settings.gate + settings.joint_gate * (count - 1) as f64,
             false => f64::INFINITY,
         };
+        // After a slip the prior pose is far off.
+        let covariance_at = if settled && !loosened { CovarianceAt::Prior } else { CovarianceAt::Posterior };
         loop {
             let refused = held.len() - members.len() + update.banned;
             if settled && refused >= LEAST_CONTRADICTION && refused > 2 * members.len() {
@@ -311,7 +316,7 @@ impl Map {
                 update.rejected += held.len();
                 return update;
             }
-            match self.belief.update_iterated(iterations, joint_gate, |x| linearised(x, &members)) {
+            match self.belief.update_iterated(iterations, covariance_at, joint_gate, |x| linearised(x, &members)) {
                 Ok(nis) => {
                     update.nis = nis;
                     break;
@@ -354,7 +359,10 @@ impl Map {
         self.belief.append(&prior.mean, &prior.variance);
         self.landmarks.push(Landmark { id: bearing.id, last_seen: self.step, strikes: 0 });
         let fits = self.fits(k, bearing, settings.gate)
-            && self.belief.update_iterated(3, |_| f64::INFINITY, |x| vec![linearise(x, k, bearing)]).is_ok();
+            && self
+                .belief
+                .update_iterated(3, CovarianceAt::Posterior, |_| f64::INFINITY, |x| vec![linearise(x, k, bearing)])
+                .is_ok();
         if !fits {
             self.drop_landmark(k);
             self.banned.insert(bearing.id, self.step + 3);
