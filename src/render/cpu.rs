@@ -18,6 +18,7 @@ use super::now::{Now, Shown};
 use super::sample::{LANES, POINTS, PointRoom, RUN};
 use super::shade::{Plane, Side, SideRoom, Sight};
 use super::spans::{NOTHING, Spans};
+use super::texels::{Gathered, LookUp, OneByOne};
 use super::{InstructionSet, Renderer, RendererInfo, Scene, View};
 use crate::error::Result;
 use crate::panorama::Panorama;
@@ -133,12 +134,12 @@ impl Painter {
         let paint_band = |(k, ((rgba, range), instance)): BandBuffers<'_>| {
             with_idle(&self.desks, |desk| {
                 let (frame, hits, spans) = (&self.frame, &self.hits, &self.spans);
-                let paint = match instructions {
-                    InstructionSet::Portable => paint,
-                    InstructionSet::Avx2 => paint_avx2,
-                    InstructionSet::Avx512 => paint_avx512,
-                };
-                paint(Band { scene, frame, hits, spans, first_row: k * rows, rgba, range, instance }, desk);
+                let band = Band { scene, frame, hits, spans, first_row: k * rows, rgba, range, instance };
+                match (instructions, Gathered::new()) {
+                    (InstructionSet::Avx512, Some(look_up)) => paint_avx512(look_up, band, desk),
+                    (InstructionSet::Avx2, _) => paint_avx2(band, desk),
+                    _ => paint(OneByOne, band, desk),
+                }
             });
         };
         if share {
@@ -249,7 +250,7 @@ impl Desk {
 
 /// Paints a band. Inlined into the functions below, all of it is compiled once for each instruction set; results are the same.
 #[inline(always)]
-fn paint(mut band: Band<'_>, desk: &mut Desk) {
+fn paint<L: LookUp>(look_up: L, mut band: Band<'_>, desk: &mut Desk) {
     let width = band.frame.params.width as usize;
     let rows = band.range.len() / width;
     let mut runs = Vec::new();
@@ -268,13 +269,13 @@ fn paint(mut band: Band<'_>, desk: &mut Desk) {
                 for run in runs.drain(..) {
                     let colours = &mut desk.columns.0[run.column % LANES][run.start..];
                     match &run.side {
-                        Some(side) => side.shade(band.frame, &mut desk.side, colours),
+                        Some(side) => side.shade(look_up, band.frame, &mut desk.side, colours),
                         None => colours[..run.count].fill(VOID),
                     }
                 }
                 desk.turn(some - first);
             }
-            shade_levels(&band, desk, group, first);
+            shade_levels(look_up, &band, desk, group, first);
         }
         for row in 0..rows {
             show_row(&mut band, desk, row, tile.clone());
@@ -284,7 +285,7 @@ fn paint(mut band: Band<'_>, desk: &mut Desk) {
 
 /// Shades the horizontal surfaces that a group of columns sees.
 #[inline(always)]
-fn shade_levels(band: &Band<'_>, desk: &mut Desk, group: Range<usize>, first: usize) {
+fn shade_levels<L: LookUp>(look_up: L, band: &Band<'_>, desk: &mut Desk, group: Range<usize>, first: usize) {
     let frame = band.frame;
     let (mut x, mut y) = ([0.0; POINTS], [0.0; POINTS]);
     for (k, direction) in frame.directions[group.clone()].iter().take(POINTS).enumerate() {
@@ -299,7 +300,7 @@ fn shade_levels(band: &Band<'_>, desk: &mut Desk, group: Range<usize>, first: us
             let t = if level.surface < 2 { row.plane } else { height * row.inverse_tan };
             let sight = Sight { scene: band.scene, frame, row, t };
             if let Some(colours) = colours[group.start - first..].first_chunk_mut() {
-                level.plane.shade(sight, [&x, &y], masks[number], &mut desk.point, colours);
+                level.plane.shade(look_up, sight, [&x, &y], masks[number], &mut desk.point, colours);
             }
         }
     }
@@ -307,13 +308,13 @@ fn shade_levels(band: &Band<'_>, desk: &mut Desk, group: Range<usize>, first: us
 
 #[multiversion::multiversion(targets("x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"))]
 fn paint_avx2(band: Band<'_>, desk: &mut Desk) {
-    paint(band, desk);
+    paint(OneByOne, band, desk);
 }
 
 /// The crate adds the other parts of AVX-512 that processors have on which it is fast.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx2+bmi1+bmi2+lzcnt+popcnt"))]
-fn paint_avx512(band: Band<'_>, desk: &mut Desk) {
-    paint(band, desk);
+fn paint_avx512(look_up: Gathered, band: Band<'_>, desk: &mut Desk) {
+    paint(look_up, band, desk);
 }
 
 /// Rows of a column to be shaded: they see an upright face, or nothing.

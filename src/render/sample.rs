@@ -7,10 +7,10 @@
 //! is sampled at once. Functions are inlined throughout, so that they run on the vector unit that their caller was compiled for.
 
 use super::scene::{Material, MipLevel};
-use super::texels::{Texels, fetch};
+use super::texels::{Block, LookUp, Pair, Texels, fetch, pairs};
 
-/// Pixels calculated at once: the 32-bit lanes of the widest vector.
-pub(super) const LANES: usize = 16;
+pub(super) use super::texels::LANES;
+
 /// Most rows of a column that are sampled at once.
 pub(super) const RUN: usize = 240;
 /// Most texels along v that a run of rows covers on a level, a power of two: at most four in three rows, for [`strip_footprint`]
@@ -57,7 +57,7 @@ pub(super) fn level(material: &Material, footprint: f32) -> MipLevel {
 #[inline(always)]
 pub(super) fn within_tile(length_m: f32, material: &Material, axis: usize) -> f32 {
     let tiles = length_m * material.tiles_per_m[axis];
-    tiles - libm::floorf(tiles)
+    tiles - tiles.floor()
 }
 
 /// A coordinate on a level, in 1/256 texel and from the centre of its first texel, of a place within the tile.
@@ -75,12 +75,8 @@ pub(super) fn wrapped(texels: f32, level: MipLevel) -> i32 {
     round(texels * 256.0).wrapping_sub(tiles.wrapping_mul(256 * level.size as i32)) - 128
 }
 
-/// Texels or colours of as many pixels as there are lanes, red in the lowest byte.
-pub(super) type Block = [u32; LANES];
 /// Two channels of each of them, 16 bits each.
 type Channels = [u16; 2 * LANES];
-/// Texels that lie next to one another along v.
-type Pair = [u32; 2];
 
 /// The mean of two channels, rounded up.
 #[inline(always)]
@@ -219,13 +215,13 @@ fn bytes_mut(block: &mut Block) -> &mut [u8; 4 * LANES] {
 #[derive(Debug)]
 pub(super) struct StripRoom {
     texels: [u32; REACH + 2 * LANES],
-    places: [u32; RUN],
-    pairs: [Pair; RUN],
+    places: [Block; RUN / LANES],
+    pairs: [[Pair; LANES]; RUN / LANES],
 }
 
 impl Default for StripRoom {
     fn default() -> Self {
-        Self { texels: [0; REACH + 2 * LANES], places: [0; RUN], pairs: [[0; 2]; RUN] }
+        Self { texels: [0; REACH + 2 * LANES], places: [[0; LANES]; RUN / LANES], pairs: [[[0; 2]; LANES]; RUN / LANES] }
     }
 }
 
@@ -267,11 +263,11 @@ impl<'a> Strip<'a> {
     }
 
     /// The lowest texel that `count` rows look at, and how many there are. A level of one texel may have rows that see the
-    /// tile more often than can be counted.
+    /// tile more often than can be counted: all places below [`REACH`] and the one that follows are then looked at.
     #[inline(always)]
     fn reach(&self, count: usize) -> (i32, usize) {
         let lowest = self.at(count - 1) >> 8;
-        (lowest, (((self.at(0) >> 8).wrapping_sub(lowest)) as u32 as usize).min(REACH - 2) + 2)
+        (lowest, (((self.at(0) >> 8).wrapping_sub(lowest)) as u32 as usize).min(REACH - 1) + 2)
     }
 
     /// Asks for the texels of `count` rows.
@@ -283,20 +279,19 @@ impl<'a> Strip<'a> {
 
     /// Colours of as many rows as there is `light` for.
     #[inline(always)]
-    pub fn shade(&self, light: &[[f32; LANES]], room: &mut StripRoom, out: &mut [Block]) {
+    pub fn shade<L: LookUp>(&self, look_up: L, light: &[[f32; LANES]], room: &mut StripRoom, out: &mut [Block]) {
         let count = LANES * light.len();
         let (lowest, span) = self.reach(count);
-        let StripRoom { texels, places, pairs } = room;
+        let StripRoom { texels, places, pairs: found } = room;
         self.lines().mix(lowest, span, texels);
-        for (k, place) in places[..count].iter_mut().enumerate() {
+        let (places, found) = (&mut places[..light.len()], &mut found[..light.len()]);
+        for (k, place) in places.as_flattened_mut().iter_mut().enumerate() {
             *place = (self.at(k) >> 8).wrapping_sub(lowest) as u32;
         }
-        for (pair, place) in pairs[..count].iter_mut().zip(&*places) {
-            let place = *place as usize & (REACH - 1);
-            *pair = [texels[place], texels[place + 1]];
+        for (found, places) in found.iter_mut().zip(&*places) {
+            pairs::<REACH, _>(look_up, texels, places, found);
         }
-        let pairs = &pairs.as_chunks::<LANES>().0[..light.len()];
-        for (block, ((pairs, light), out)) in pairs.iter().zip(light).zip(out).enumerate() {
+        for (block, ((pairs, light), out)) in found.iter().zip(light).zip(out).enumerate() {
             let (mut near, mut far, mut weight) = ([0; LANES], [0; LANES], [0; LANES]);
             for k in 0..LANES {
                 near[k] = pairs[k][0];
@@ -321,13 +316,13 @@ pub(super) const POINTS: usize = 4 * LANES;
 /// Where the texels lie that some points need.
 #[derive(Debug)]
 pub(super) struct PointRoom {
-    /// Texels on either side of each point along u.
-    pairs: [[Pair; POINTS]; 2],
+    /// Block by block the texels on either side of each point along u.
+    pairs: [[[Pair; LANES]; 2]; POINTS / LANES],
 }
 
 impl Default for PointRoom {
     fn default() -> Self {
-        Self { pairs: [[[0; 2]; POINTS]; 2] }
+        Self { pairs: [[[[0; 2]; LANES]; 2]; POINTS / LANES] }
     }
 }
 
@@ -352,10 +347,9 @@ struct Taps {
 impl Points<'_> {
     /// Looks up the texels of the blocks that have a bit in `wanted`.
     #[inline(always)]
-    pub fn look_up(&self, wanted: u64, room: &mut PointRoom) {
-        let [near, far] = &mut room.pairs;
+    pub fn look_up<L: LookUp>(&self, look_up: L, wanted: u64, room: &mut PointRoom) {
         let texels = Texels::new(self.atlas, self.level);
-        for block in 0..POINTS / LANES {
+        for (block, pairs) in room.pairs.iter_mut().enumerate() {
             if !is_wanted(wanted, block) {
                 continue;
             }
@@ -364,11 +358,7 @@ impl Points<'_> {
                 let point = LANES * block + k;
                 *place = texels.place((self.u[point] >> 8) as u32, (self.v[point] >> 8) as u32);
             }
-            let near = &mut near[LANES * block..][..LANES];
-            let far = &mut far[LANES * block..][..LANES];
-            for k in 0..LANES {
-                [near[k], far[k]] = texels.square(places[k]);
-            }
+            texels.squares(look_up, &places, pairs);
         }
     }
 
@@ -386,14 +376,15 @@ impl Points<'_> {
     }
 
     #[inline(always)]
-    fn taps(&self, block: usize, PointRoom { pairs: [near, far] }: &PointRoom) -> Taps {
+    fn taps(&self, block: usize, room: &PointRoom) -> Taps {
+        let [near, far] = &room.pairs[block];
         let mut taps = Taps { texels: [[[0; LANES]; 2]; 2], u: [0; LANES], v: [0; LANES] };
         for k in 0..LANES {
             let point = LANES * block + k;
             taps.u[k] = twice(self.u[point] & 255);
             taps.v[k] = twice(self.v[point] & 255);
-            [taps.texels[0][0][k], taps.texels[1][0][k]] = near[point];
-            [taps.texels[0][1][k], taps.texels[1][1][k]] = far[point];
+            [taps.texels[0][0][k], taps.texels[1][0][k]] = near[k];
+            [taps.texels[0][1][k], taps.texels[1][1][k]] = far[k];
         }
         taps
     }
@@ -445,4 +436,28 @@ pub(super) fn shade_point(atlas: &[u32], level: MipLevel, [u, v]: [f32; 2], ligh
 #[inline(always)]
 pub(super) fn is_wanted(mask: u64, block: usize) -> bool {
     mask >> (LANES * block) & ((1 << LANES) - 1) != 0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::scene::LEVELS;
+    use super::super::texels::OneByOne;
+    use super::*;
+
+    /// Rows that see a tile of one texel several times over, farther than can be counted, see nothing of what was mixed before.
+    #[test]
+    fn rows_that_see_many_tiles_see_only_these() {
+        const GREY: u32 = 0xff80_8080;
+        let level = MipLevel { base: 0, size: 1 };
+        let material = Material { tiles_per_m: [1.0; 2], last_level: 0, padding: 0, levels: [level; LEVELS] };
+        for tenths in 20..60 {
+            let strip = Strip::new(&[GREY; 9 + 2 * LANES], &material, [0.3, 0.7, 0.1 * tenths as f32], level, 0);
+            let mut room = StripRoom::default();
+            room.texels.fill(u32::MAX);
+            let mut out = [[0; LANES]; RUN / LANES];
+            strip.shade(OneByOne, &[[1.0; LANES]; RUN / LANES], &mut room, &mut out);
+            let other = out.as_flattened().iter().position(|colour| *colour != GREY);
+            assert_eq!(other, None, "{tenths}");
+        }
+    }
 }

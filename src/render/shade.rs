@@ -11,6 +11,7 @@ use super::sample::{
     LANES, POINTS, PointRoom, Points, RUN, Strip, StripRoom, footprint, is_wanted, level, shade_point, strip_footprint,
     within_tile, wrapped,
 };
+use super::texels::LookUp;
 
 /// Least distance from a lamp that counts, squared, m^2: a lamp is no point.
 const LAMP_SIZE_SQUARED: f32 = 0.01;
@@ -110,12 +111,12 @@ impl<'a> Side<'a> {
 
     /// Colours of the rows. What follows in `out` up to a whole number of blocks is overwritten, too.
     #[inline(always)]
-    pub fn shade(&self, frame: &Frame, room: &mut SideRoom, out: &mut [u32]) {
+    pub fn shade<L: LookUp>(&self, look_up: L, frame: &Frame, room: &mut SideRoom, out: &mut [u32]) {
         self.light(frame, &mut room.light[..self.count]);
         if frame.params.equal_angle == 0 {
             let blocks = self.count.div_ceil(LANES);
             let (light, out) = (room.light.as_chunks().0, out.as_chunks_mut().0);
-            self.strip.shade(&light[..blocks], &mut room.strip, &mut out[..blocks]);
+            self.strip.shade(look_up, &light[..blocks], &mut room.strip, &mut out[..blocks]);
             return;
         }
         // Steps and level of detail change from row to row.
@@ -238,8 +239,9 @@ impl Plane {
 
     /// Colours of some columns of a row that sees it, those that have a bit in `wanted`; they look along `x` and `y`.
     #[inline(always)]
-    pub fn shade(
+    pub fn shade<L: LookUp>(
         &self,
+        look_up: L,
         Sight { scene, frame, row, t }: Sight<'_>,
         [x, y]: [&[f32; POINTS]; 2],
         wanted: u64,
@@ -263,7 +265,7 @@ impl Plane {
             v[k] = wrapped(texels[1] * (cos * y[k] - sin * x[k]) + camera[1], level);
         }
         let points = Points { atlas: &scene.atlas, level, u: &u, v: &v };
-        points.look_up(wanted, room);
+        points.look_up(look_up, wanted, room);
         let (x, y, out) = (x.as_chunks().0, y.as_chunks().0, out.as_chunks_mut::<LANES>().0);
         for (block, ((x, y), out)) in x.iter().zip(y).zip(out).enumerate() {
             if !is_wanted(wanted, block) {

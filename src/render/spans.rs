@@ -54,16 +54,34 @@ impl Spans {
         self.starts.clear();
         self.starts.push(0);
         let room = room(&frame.rows);
+        let mut ahead = 0..0;
         for column in 0..frame.params.width as usize {
             let hits = hits.of(column);
+            if let [wall] = hits
+                && wall.top >= FAR
+            {
+                ahead = before_planes_beside(frame, wall.near, &ahead);
+                self.lay_out_wall(wall, &ahead, &room);
             // Whose footprints do not overlap hide one another as a whole.
-            if hits.windows(2).all(|pair| pair[0].far <= pair[1].near) {
+            } else if hits.windows(2).all(|pair| pair[0].far <= pair[1].near) {
                 self.lay_out(frame, hits, &room);
             } else {
                 self.compete(frame, hits, &room);
             }
             self.starts.push(self.spans.len() as u32);
         }
+    }
+
+    /// A wall with nothing before it, which rows `ahead` see.
+    fn lay_out_wall(&mut self, wall: &Hit, ahead: &Range<usize>, room: &[Span]) {
+        let (start, end) = (ahead.start as u32, ahead.end.max(ahead.start) as u32);
+        let above = room.iter().filter(|r| r.start < start);
+        self.spans.extend(above.map(|r| Span { end: r.end.min(start), ..*r }));
+        if start < end {
+            self.spans.push(Span { start, end, surface: wall.surface, face: Face::Side, hit: 0 });
+        }
+        let below = room.iter().filter(|r| r.end > end);
+        self.spans.extend(below.map(|r| Span { start: r.start.max(end), ..*r }));
     }
 
     /// Nearest hits first: each takes what is left of the rows that see it.
@@ -191,6 +209,26 @@ fn claim(column: &mut Vec<Span>, pieces: &mut Vec<Span>, span: Span) {
     std::mem::swap(column, pieces);
 }
 
+/// The same as [`RowFinder::before_planes`], where it was `beside` a column before: most columns see a wall like their neighbours.
+#[inline]
+fn before_planes_beside(frame: &Frame, near: f32, beside: &Range<usize>) -> Range<usize> {
+    let start = first_beside(&frame.rows, beside.start, |r| r.tan < 0.0 || r.plane > near);
+    let end = first_beside(&frame.rows, beside.end, |r| r.tan < 0.0 && r.plane <= near);
+    start..end
+}
+
+/// The first row for which `below` holds, which it does for all rows after the first; sought from `row` on.
+#[inline]
+fn first_beside(rows: &[Row], mut row: usize, below: impl Fn(&Row) -> bool) -> usize {
+    while row > 0 && below(&rows[row - 1]) {
+        row -= 1;
+    }
+    while row < rows.len() && !below(&rows[row]) {
+        row += 1;
+    }
+    row
+}
+
 /// Finds rows by the tangent of their elevation: a table says where to look, a few steps from there are exact.
 #[derive(Debug, Default)]
 struct RowFinder {
@@ -222,14 +260,7 @@ impl RowFinder {
     #[inline]
     fn first(&self, rows: &[Row], tan: f32, below: impl Fn(&Row) -> bool) -> usize {
         let cell = ((self.top - tan) * self.per_tan).clamp(0.0, (self.table.len() - 1) as f32);
-        let mut row = self.table[cell as usize] as usize;
-        while row > 0 && below(&rows[row - 1]) {
-            row -= 1;
-        }
-        while row < rows.len() && !below(&rows[row]) {
-            row += 1;
-        }
-        row
+        first_beside(rows, self.table[cell as usize] as usize, below)
     }
 
     /// The rows whose rays come farther than `near` before they meet floor or ceiling.
