@@ -49,10 +49,11 @@ const SETTLED: f64 = 1e-3;
 /// Where the measurements of an update are linearised for the covariance.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum CovarianceAt {
-    /// At the prior mean, about where earlier measurements were. Measurements that are linearised in different places claim to tell
-    /// what they cannot (Huang, Mourikis and Roumeliotis, 2010).
+    /// At the prior mean, which is nearer to where earlier measurements were linearised than the iterate is. Measurements that are
+    /// linearised in different places claim to tell what they cannot (Huang, Mourikis and Roumeliotis, 2010, who therefore keep the
+    /// first estimates).
     Prior,
-    /// At the best estimate: for priors so wide that their mean means little.
+    /// At the last iterate but one: for priors so wide that their mean means little.
     Posterior,
 }
 
@@ -169,8 +170,8 @@ impl Gaussian {
     }
 
     /// Iterated measurement update (Gauss-Newton on the posterior): `linearise` is called with the current iterate and gives
-    /// the same measurements each time, linearised there; `covariance_at` says which of them shrink the covariance. Returns the normalised innovation squared of the whole batch at the
-    /// prior mean.
+    /// the same measurements each time, linearised there; `covariance_at` says which linearisation shrinks the covariance. Returns
+    /// the normalised innovation squared of the whole batch at the prior mean.
     ///
     /// # Errors
     ///

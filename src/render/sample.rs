@@ -210,7 +210,7 @@ fn bytes_mut(block: &mut Block) -> &mut [u8; 4 * LANES] {
     bytemuck::cast_mut(block)
 }
 
-/// Where the texels lie that a run of rows needs. Looking texels up runs one by one, calculating with them in vectors: each is
+/// Where the texels lie that a run of rows needs. Looking texels up mostly runs one by one, calculating with them in vectors: each is
 /// done for the whole run before the other, for a vector that was just written in parts takes long to load.
 #[derive(Debug)]
 pub(super) struct StripRoom {

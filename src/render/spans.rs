@@ -62,8 +62,8 @@ impl Spans {
             {
                 ahead = before_planes_beside(frame, wall.near, &ahead);
                 self.lay_out_wall(wall, &ahead, &room);
-            // Whose footprints do not overlap hide one another as a whole.
             } else if hits.windows(2).all(|pair| pair[0].far <= pair[1].near) {
+                // Whose footprints do not overlap hide one another as a whole.
                 self.lay_out(frame, hits, &room);
             } else {
                 self.compete(frame, hits, &room);
@@ -74,7 +74,7 @@ impl Spans {
 
     /// A wall with nothing before it, which rows `ahead` see.
     fn lay_out_wall(&mut self, wall: &Hit, ahead: &Range<usize>, room: &[Span]) {
-        let (start, end) = (ahead.start as u32, ahead.end.max(ahead.start) as u32);
+        let (start, end) = (ahead.start as u32, ahead.end as u32);
         let above = room.iter().filter(|r| r.start < start);
         self.spans.extend(above.map(|r| Span { end: r.end.min(start), ..*r }));
         if start < end {
@@ -270,5 +270,39 @@ impl RowFinder {
         let start = self.first(rows, (p.room_height - p.camera_height) / near, |r| r.tan < 0.0 || r.plane > near);
         let end = self.first(rows, -p.camera_height / near, |r| r.tan < 0.0 && r.plane <= near);
         start..end
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Pose;
+    use crate::render::{Scene, View};
+    use crate::world::World;
+
+    /// The short way and the general one, with walls that jump between near and far, and with a horizon in and beyond the picture.
+    #[test]
+    fn a_lone_wall_is_laid_out_like_any_hit() {
+        let world = World::open("lab").unwrap();
+        let scene = Scene::new(&world).unwrap();
+        let bodies = world.body_poses();
+        for (height, horizon_row) in [(1, 0.5), (2, 1.0), (40, 12.3), (40, -9.0), (40, 55.0)] {
+            let projection = crate::panorama::Projection { horizon_row, ..world.projection_of_size(90, height) };
+            let mut frame = Frame::new();
+            let robot = Pose::new(world.home.x, world.home.y, 0.0);
+            frame.prepare(&scene, &View { projection, robot, bodies: &bodies }).unwrap();
+            let (room, mut ahead) = (room(&frame.rows), 0..0);
+            let mut spans = [Spans::default(), Spans::default()];
+            for near in [3.0, 0.01, 0.4, 900.0, 5.0, 5.1, 0.2, 2.0e8] {
+                let wall = Hit { near, far: near, surface: 2, ..Hit::NONE };
+                spans.iter_mut().for_each(|s| s.spans.clear());
+                spans[0].finder.prepare(&frame.rows);
+                spans[0].lay_out(&frame, &[wall], &room);
+                ahead = before_planes_beside(&frame, near, &ahead);
+                spans[1].lay_out_wall(&wall, &ahead, &room);
+                assert_eq!(spans[0].spans, spans[1].spans, "{height} {horizon_row} {near}");
+                assert_eq!(spans[1].spans.last().unwrap().end, height);
+            }
+        }
     }
 }

@@ -58,7 +58,7 @@ fn consistency(bound: &Bound) -> String {
     let all = (last - first + 1) as usize;
     let settled: Vec<&BoundRow> = bound.rows.iter().filter(|row| row.runs == all).collect();
     let c = &bound.consistency;
-    let mut text = String::new();
+    let mut text = String::from("\n");
     if !settled.is_empty() {
         let mean = |value: fn(&BoundRow) -> Option<f64>, digits: usize| {
             let values: Vec<f64> = settled.iter().filter_map(|row| value(row).filter(|v| v.is_finite())).collect();
@@ -66,13 +66,15 @@ fn consistency(bound: &Bound) -> String {
             if values.is_empty() { "-".to_owned() } else { format!("{mean:.digits$}") }
         };
         let (nees, nis) = (mean(|row| row.nees, 2), mean(|row| row.nis, 3));
-        let _ = write!(
+        let _ = writeln!(
             text,
-            "\nOver the {} steps after all runs have an estimate, the mean NEES is {nees} (3 is consistent), NIS {nis} (1 is).\n",
+            "Over the {} steps after all runs have an estimate, the mean NEES is {nees} (3 is consistent), NIS {nis} (1 is).",
             settled.len()
         );
     }
-    if c.steps > 0 {
+    if c.steps == 0 {
+        text.push_str("There is no step in which all runs of a group have an estimate.\n");
+    } else {
         let [low, high] = nees_band(c.group);
         let share = |steps: usize| 100.0 * steps as f64 / c.steps as f64;
         let (nees, nis, groups) = (share(c.nees_in_band), share(c.nis_in_band), if c.groups == 1 { "group" } else { "groups" });

@@ -1,12 +1,12 @@
 //! How well can where home is be known at all? The Cramer-Rao bound along a path, and what the filter makes of it.
 //!
-//! One run is driven in closed loop and its path kept. What the sensors tell along that path has a Fisher information about
+//! One run is driven in closed loop and its odometry kept. What the sensors tell along a way has a Fisher information about
 //! everything that is unknown: the robot's pose at each step, the direction and inverse range of each landmark from home. The
 //! inverse of what is left of it for the last pose, all else marginalised, bounds the covariance of any unbiased estimate of
 //! that pose; along the polar coordinates of the paper it bounds R, theta and alpha. It is evaluated at the truth, which no
 //! estimator knows, and ranges have no prior worth the name.
 //!
-//! Beside it the anchored filter is run along the same path again and again, with noise of its own in each repetition and told
+//! Beside it the anchored filter is run with that odometry again and again, with noise of its own in each repetition and told
 //! the true size of that noise. Odometry reads the same each time; it is the truth that strays from it, as slip and scrub do it,
 //! by the filter's own motion model. So the bound's model is the filter's and the world's, and what the filter loses against the
 //! bound it loses by linearising and deciding. Since no two runs go the same way, and passing a landmark a little nearer tells a
@@ -74,7 +74,7 @@ impl Default for BoundSettings {
 }
 
 impl BoundSettings {
-    fn check(&self, world: &World, runs: usize) -> Result<()> {
+    fn check(&self, world: &World, seeds: &RangeInclusive<u64>) -> Result<()> {
         let invalid = |what: &str, found: String, allowed: &str| {
             Err(Error::Invalid { what: what.into(), found, allowed: allowed.into() })
         };
@@ -85,10 +85,15 @@ impl BoundSettings {
         if !(0.0..1.0).contains(&self.odometry_share) {
             return invalid("noise of odometry", self.odometry_share.to_string(), "a share from 0 to less than 1");
         }
+        if seeds.is_empty() {
+            return invalid("seeds", format!("{} to {}", seeds.start(), seeds.end()), "at least one");
+        }
+        let last = seeds.end() - seeds.start();
         if let Some(group) = self.group
-            && !(1..=runs).contains(&group)
+            && (group == 0 || group as u64 - 1 > last)
         {
-            return invalid("runs in a group", group.to_string(), &format!("1 to {runs}, as many as there are seeds"));
+            let allowed = format!("1 to {}, as many as there are seeds", last.saturating_add(1));
+            return invalid("runs in a group", group.to_string(), &allowed);
         }
         let offset = world.spec.camera.offset_m;
         if offset != [0.0; 2] {
@@ -126,6 +131,14 @@ pub struct PolarErrors {
 }
 
 impl PolarErrors {
+    /// Of the runs together: the mean of their variances is the least mean squared error of an unbiased estimate in all of them. `None`
+    /// where one of them is unbounded.
+    fn root_mean_square(each: impl Iterator<Item = Option<Self>>) -> Option<Self> {
+        let each: Vec<Self> = each.collect::<Option<_>>()?;
+        let mean = |of: fn(&Self) -> f64| (each.iter().map(|e| of(e) * of(e)).sum::<f64>() / each.len() as f64).sqrt();
+        Some(Self { range_m: mean(|e| e.range_m), bearing_rad: mean(|e| e.bearing_rad), heading_rad: mean(|e| e.heading_rad) })
+    }
+
     /// By component, these over `other`.
     #[must_use]
     pub fn over(&self, other: &Self) -> [f64; 3] {
@@ -138,9 +151,10 @@ impl PolarErrors {
 pub struct BoundRow {
     /// Time since the start, s.
     pub time_s: f64,
-    /// Distance to home, m.
+    /// Distance to home on the path that odometry tells, m; runs stray from it.
     pub distance_m: f64,
-    /// Least standard deviations of an unbiased estimate; `None` while the information is singular.
+    /// Least standard deviations of an unbiased estimate over the first [`BOUND_RUNS`] runs; `None` while the information of one of
+    /// them is singular.
     pub bound: Option<PolarErrors>,
     /// Runs of the filter that have an estimate by now.
     pub runs: usize,
@@ -251,19 +265,23 @@ pub fn bound(
     seeds: &RangeInclusive<u64>,
     watch: &(dyn Fn() -> ControlFlow<()> + Sync),
 ) -> Result<Bound> {
-    settings.check(world, seeds.clone().count())?;
+    settings.check(world, seeds)?;
     let path = Path::drive(world, settings)?;
-    let runs: Vec<Vec<Option<StepErrors>>> = seeds
+    let runs: Vec<(Vec<Option<StepErrors>>, Option<_>)> = seeds
         .clone()
         .collect::<Vec<u64>>()
         .into_par_iter()
-        .map(|seed| {
-            let errors = path.estimate(world, settings, Seed(seed))?;
-            if watch().is_break() { Err(Error::Interrupted) } else { Ok(errors) }
+        .enumerate()
+        .map(|(k, seed)| {
+            let way = path.way(world, settings, Seed(seed));
+            let errors = path.estimate(world, settings, Seed(seed), &way)?;
+            let bounds = (k < BOUND_RUNS).then(|| path.bounds(world, settings, &way)).transpose()?;
+            if watch().is_break() { Err(Error::Interrupted) } else { Ok((errors, bounds)) }
         })
         .collect::<Result<_>>()?;
-    let ways: Vec<Vec<Pose>> = seeds.clone().take(BOUND_RUNS).map(|seed| path.way(world, settings, Seed(seed))).collect();
-    let bounds = path.bounds(world, settings, &ways)?;
+    let (runs, bounds): (Vec<_>, Vec<_>) = runs.into_iter().unzip();
+    let each: Vec<Vec<Option<PolarErrors>>> = bounds.into_iter().flatten().collect();
+    let bounds: Vec<_> = (0..path.steps.len()).map(|k| PolarErrors::root_mean_square(each.iter().map(|b| b[k]))).collect();
     let rows = |runs: &[Vec<Option<StepErrors>>]| -> Vec<BoundRow> {
         (0..path.steps.len()).map(|k| path.row(k, runs.iter().filter_map(|run| run[k].as_ref()), bounds[k])).collect()
     };
@@ -368,25 +386,8 @@ impl Path {
         }
     }
 
-    /// The bound at each step, of runs that go these ways together: no filter's mean squared error is less than the mean of the
-    /// least variances. `None` where one of them is unbounded.
-    fn bounds(&self, world: &World, settings: &BoundSettings, ways: &[Vec<Pose>]) -> Result<Vec<Option<PolarErrors>>> {
-        let each: Vec<_> = ways.par_iter().map(|way| self.bounds_along(world, settings, way)).collect::<Result<_>>()?;
-        let of_step = |k: usize| {
-            let bounds: Vec<PolarErrors> = each.iter().map(|bounds| bounds[k]).collect::<Option<_>>()?;
-            let mean =
-                |of: fn(&PolarErrors) -> f64| (bounds.iter().map(|b| of(b) * of(b)).sum::<f64>() / bounds.len() as f64).sqrt();
-            Some(PolarErrors {
-                range_m: mean(|b| b.range_m),
-                bearing_rad: mean(|b| b.bearing_rad),
-                heading_rad: mean(|b| b.heading_rad),
-            })
-        };
-        Ok((0..self.steps.len()).map(of_step).collect())
-    }
-
     /// The bound at each step of a run whose true poses in the room these are.
-    fn bounds_along(&self, world: &World, settings: &BoundSettings, way: &[Pose]) -> Result<Vec<Option<PolarErrors>>> {
+    fn bounds(&self, world: &World, settings: &BoundSettings, way: &[Pose]) -> Result<Vec<Option<PolarErrors>>> {
         let mut sensor = IdealSensor::new(world);
         let variance = settings.bearing_sd_rad * settings.bearing_sd_rad;
         let looks = way.iter().zip(&self.steps);
@@ -456,16 +457,15 @@ impl Path {
             .collect()
     }
 
-    /// The filter's errors along the path, one a step where it has an estimate.
-    fn estimate(&self, world: &World, settings: &BoundSettings, seed: Seed) -> Result<Vec<Option<StepErrors>>> {
+    /// The filter's errors on a run's way, one a step where it has an estimate.
+    fn estimate(&self, world: &World, settings: &BoundSettings, seed: Seed, way: &[Pose]) -> Result<Vec<Option<StepErrors>>> {
         let noise = seed.derive("bound");
         let mut sensor = NoisySensor::new(IdealSensor::new(world), world.landmark_count, settings.noise(), noise);
-        let way = self.way(world, settings, seed);
         let mut filter = AnchoredFilter::new(settings.filter(world), sensor.home());
         self.steps
             .iter()
             .zip(way)
-            .map(|(step, truth)| {
+            .map(|(step, &truth)| {
                 let report = filter.step(&step.odometry, &sensor.observe(truth, &step.bodies)?);
                 Ok(filter.estimate().map(|estimate| StepErrors {
                     belief: BeliefError::new(&estimate, &self.home.to_local(&truth)),
@@ -544,7 +544,15 @@ mod tests {
         };
         assert_eq!(judge(1..=20, Some(8)).unwrap(), both);
         assert!(a.nees_in_band > 0 && b.nis_in_band > 0, "{a:?} {b:?}");
-        assert!(judge(1..=8, Some(9)).is_err() && judge(1..=8, Some(0)).is_err());
+        let none = RangeInclusive::new(5, 1);
+        assert!(judge(1..=8, Some(9)).is_err() && judge(1..=8, Some(0)).is_err() && judge(none, None).is_err());
+    }
+
+    #[test]
+    fn variances_are_averaged_and_not_deviations() {
+        let errors = |k: f64| PolarErrors { range_m: k, bearing_rad: 2.0 * k, heading_rad: 3.0 * k };
+        assert_eq!(PolarErrors::root_mean_square([Some(errors(1.0)), Some(errors(7.0))].into_iter()), Some(errors(5.0)));
+        assert_eq!(PolarErrors::root_mean_square([Some(errors(1.0)), None].into_iter()), None);
     }
 
     /// What can only help does help, and the bound scales as the noise does.
@@ -554,7 +562,7 @@ mod tests {
         let world = World::open("lab").unwrap();
         let path = Path::drive(&world, &settings).unwrap();
         let straight: Vec<Pose> = path.steps.iter().map(|step| step.truth).collect();
-        let at_end = |s: &BoundSettings| path.bounds_along(&world, s, &straight).unwrap().last().copied().flatten().unwrap();
+        let at_end = |s: &BoundSettings| path.bounds(&world, s, &straight).unwrap().last().copied().flatten().unwrap();
         let usual = at_end(&settings);
         let twice = BoundSettings {
             bearing_sd_rad: 2.0 * settings.bearing_sd_rad,
@@ -564,7 +572,7 @@ mod tests {
         let [range, _, heading] = at_end(&twice).over(&usual);
         // Twice all noise is twice the bound, but for the small terms of the motion model that stay.
         assert!((1.85..2.0001).contains(&range) && (1.85..2.0001).contains(&heading), "{range} {heading}");
-        let bounds = path.bounds_along(&world, &settings, &straight).unwrap();
+        let bounds = path.bounds(&world, &settings, &straight).unwrap();
         let early = bounds[10].unwrap();
         assert!(early.range_m > 3.0 * bounds[40].unwrap().range_m, "motion makes range visible: {early:?}");
     }

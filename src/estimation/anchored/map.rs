@@ -307,7 +307,7 @@ impl Map {
             true => settings.gate + settings.joint_gate * (count - 1) as f64,
             false => f64::INFINITY,
         };
-        // After a slip the prior pose is far off.
+        // While ranges are unknown, and after a slip, the prior mean is far off.
         let covariance_at = if settled && !loosened { CovarianceAt::Prior } else { CovarianceAt::Posterior };
         loop {
             let refused = held.len() - members.len() + update.banned;
