@@ -31,8 +31,8 @@ pub(super) struct Hit {
 }
 
 impl Hit {
-    /// Fills lists before they are used.
-    pub const NONE: Self = Self { near: FAR, far: FAR, bottom: -FAR, top: FAR, normal: [0.0; 2], u: 0.0, surface: 0 };
+    /// Stands where there is none.
+    pub const NONE: &'static Self = &Self { near: FAR, far: FAR, bottom: -FAR, top: FAR, normal: [0.0; 2], u: 0.0, surface: 0 };
 }
 
 /// What a ray sees of a hit.
@@ -43,6 +43,7 @@ pub(super) enum Face {
     Underside = 2,
 }
 
+#[inline(always)]
 fn dot(a: [f32; 2], b: [f32; 2]) -> f32 {
     a[0] * b[0] + a[1] * b[1]
 }
@@ -50,6 +51,7 @@ fn dot(a: [f32; 2], b: [f32; 2]) -> f32 {
 /// The rays' hit on wall `k`, if they meet it from inside the room.
 ///
 /// Walls count as endlessly high: floor and ceiling are nearer wherever a ray would pass below or above one.
+#[inline(always)]
 pub(super) fn hit_wall(edge: &Edge, k: u32, direction: [f32; 2]) -> Option<Hit> {
     let facing = dot(edge.normal, direction);
     if facing >= 0.0 || edge.distance >= 0.0 {
@@ -58,10 +60,11 @@ pub(super) fn hit_wall(edge: &Edge, k: u32, direction: [f32; 2]) -> Option<Hit> 
     let near = edge.distance / facing;
     let along = near * dot(edge.tangent, direction) - edge.along;
     let met = along >= -OVERLAP && along <= edge.length + OVERLAP;
-    met.then(|| Hit { near, far: near, normal: edge.normal, u: edge.u + along, surface: 2 + k, ..Hit::NONE })
+    met.then(|| Hit { near, far: near, normal: edge.normal, u: edge.u + along, surface: 2 + k, ..*Hit::NONE })
 }
 
 /// The rays' hit on a body, if they meet it; `None` also where the camera is inside its solid.
+#[inline(always)]
 pub(super) fn hit_body(frame: &Frame, k: u32, direction: [f32; 2]) -> Option<Hit> {
     let body = &frame.bodies[k as usize];
     let hit = if body.radius > 0.0 { hit_disc(body, direction) } else { hit_polygon(frame, body, direction) }?;
@@ -70,6 +73,7 @@ pub(super) fn hit_body(frame: &Frame, k: u32, direction: [f32; 2]) -> Option<Hit
     (!inside).then_some(Hit { near: hit.near.max(0.0), bottom: body.bottom, top: body.top, surface, ..hit })
 }
 
+#[inline(always)]
 fn hit_disc(body: &Body, direction: [f32; 2]) -> Option<Hit> {
     let c = body.centre;
     let middle = dot(c, direction);
@@ -87,9 +91,10 @@ fn hit_disc(body: &Body, direction: [f32; 2]) -> Option<Hit> {
     let normal = [(near * direction[0] - c[0]) / body.radius, (near * direction[1] - c[1]) / body.radius];
     let [cos, sin] = body.heading;
     let own = [cos * normal[0] + sin * normal[1], cos * normal[1] - sin * normal[0]];
-    Some(Hit { near, far, normal, u: body.radius * angle(own[1], own[0]), ..Hit::NONE })
+    Some(Hit { near, far, normal, u: body.radius * angle(own[1], own[0]), ..*Hit::NONE })
 }
 
+#[inline(always)]
 fn hit_polygon(frame: &Frame, body: &Body, direction: [f32; 2]) -> Option<Hit> {
     let first = body.first_edge as usize;
     let (mut near, mut far, mut entry) = (-FAR, FAR, first);
@@ -115,10 +120,11 @@ fn hit_polygon(frame: &Frame, body: &Body, direction: [f32; 2]) -> Option<Hit> {
     }
     let edge = &frame.edges[entry];
     let along = near * dot(edge.tangent, direction) - edge.along;
-    Some(Hit { near, far, normal: edge.normal, u: edge.u + along, ..Hit::NONE })
+    Some(Hit { near, far, normal: edge.normal, u: edge.u + along, ..*Hit::NONE })
 }
 
 /// Angle of (x, y) in (-pi, pi], to 1e-5 rad: by a polynomial, so that CPU and GPU compute the same.
+#[inline(always)]
 fn angle(y: f32, x: f32) -> f32 {
     let (ax, ay) = (x.abs(), y.abs());
     let ratio = ax.min(ay) / ax.max(ay).max(1.0e-30);

@@ -11,12 +11,12 @@ use std::sync::{Mutex, PoisonError};
 
 use rayon::prelude::*;
 
-use super::columns::Face;
+use super::columns::{Face, Hit};
 use super::frame::Frame;
 use super::hits::ColumnHits;
-use super::now::{Now, Shown};
-use super::sample::{LANES, POINTS, PointRoom, RUN};
-use super::shade::{Plane, Side, SideRoom, Sight};
+use super::now::{Now, Shown, Unit};
+use super::sample::{LANES, POINTS, PointRoom, RUN, StripRoom};
+use super::shade::{Light, Plane, PlaneRow, Run, Sides};
 use super::spans::{NOTHING, Spans};
 use super::texels::{Gathered, LookUp, OneByOne};
 use super::{InstructionSet, Renderer, RendererInfo, Scene, View};
@@ -49,7 +49,7 @@ struct Painter {
     frame: Frame,
     hits: ColumnHits,
     spans: Spans,
-    desks: Mutex<Vec<Desk>>,
+    desks: Mutex<Vec<Box<Desk>>>,
 }
 
 impl CpuRenderer {
@@ -124,8 +124,12 @@ impl Painter {
         share: bool,
     ) -> Result<()> {
         self.frame.prepare(scene, view)?;
-        self.hits.find(&self.frame);
-        self.spans.find(&self.frame, &self.hits);
+        if instructions == InstructionSet::Portable {
+            self.hits.find(&self.frame);
+            self.spans.find(&self.frame, &self.hits);
+        } else {
+            find_avx2(&self.frame, &mut self.hits, &mut self.spans);
+        }
         out.reshape(view.projection)?;
         let (width, height) = (view.projection.width as usize, view.projection.height as usize);
         let most = if share { BAND.min(height.div_ceil(rayon::current_num_threads())) } else { BAND };
@@ -184,17 +188,21 @@ struct Desk {
     first_change: Vec<u32>,
     /// Horizontal surfaces that the group of columns at work sees.
     levels: Vec<Level>,
-    /// For each of them and each row the columns that see it, a bit each.
+    /// For each of them and each row, and the one after the last, the columns that begin or cease to see it there, a bit each.
     masks: Vec<u64>,
     /// What the columns show in the row at work.
     now: Now,
     columns: Columns,
-    side: SideRoom,
-    point: PointRoom,
+    /// Where sides are worked on: one is shaded while the texels of the next are brought.
+    strips: [StripRoom; 2],
+    light: Light,
+    /// Where horizontal surfaces are.
+    points: PointRoom,
 }
 
 /// Colours of some columns, each from the top, and of what may be written after its end.
 #[derive(Debug)]
+#[repr(align(64))]
 struct Columns([[u32; RUN + 2 * LANES]; LANES]);
 
 impl Default for Columns {
@@ -234,11 +242,11 @@ impl Desk {
         self.now.resize(columns);
     }
 
-    /// Puts the columns that were worked on into the rows, from column `first` of the tile on.
+    /// Puts some rows of the columns that were worked on into the tile's, from its column `first` on.
     #[inline(always)]
-    fn turn(&mut self, first: usize) {
+    fn turn(&mut self, first: usize, rows: Range<usize>) {
         let columns = &self.columns.0;
-        for (r, places) in self.colours.chunks_exact_mut(self.stride).enumerate().take(RUN) {
+        for (r, places) in self.colours.chunks_exact_mut(self.stride).enumerate().take(rows.end).skip(rows.start) {
             if let Some(places) = places[first..].first_chunk_mut::<LANES>() {
                 for c in 0..LANES {
                     places[c] = columns[c][r];
@@ -253,7 +261,8 @@ impl Desk {
 fn paint<L: LookUp>(look_up: L, mut band: Band<'_>, desk: &mut Desk) {
     let width = band.frame.params.width as usize;
     let rows = band.range.len() / width;
-    let mut runs = Vec::new();
+    let room = room(&band, rows);
+    let mut tasks = Vec::new();
     let columns = width.div_ceil(width.div_ceil(TILE)).next_multiple_of(POINTS);
     for first in (0..width).step_by(columns) {
         let tile = first..width.min(first + columns);
@@ -263,19 +272,16 @@ fn paint<L: LookUp>(look_up: L, mut band: Band<'_>, desk: &mut Desk) {
             desk.levels.clear();
             desk.masks.clear();
             for some in group.clone().step_by(LANES) {
+                tasks.clear();
                 for column in some..group.end.min(some + LANES) {
-                    lay_out(&band, desk, rows, column, first, &mut runs);
+                    lay_out(&band, desk, rows, column, first, &mut tasks);
                 }
-                for run in runs.drain(..) {
-                    let colours = &mut desk.columns.0[run.column % LANES][run.start..];
-                    match &run.side {
-                        Some(side) => side.shade(look_up, band.frame, &mut desk.side, colours),
-                        None => colours[..run.count].fill(VOID),
-                    }
+                for tasks in tasks.chunks(LANES) {
+                    shade_sides(look_up, &band, desk, tasks);
                 }
-                desk.turn(some - first);
+                desk.turn(some - first, rows_of(&tasks));
             }
-            shade_levels(look_up, &band, desk, group, first);
+            shade_levels(look_up, &band, &room, desk, group, first);
         }
         for row in 0..rows {
             show_row(&mut band, desk, row, tile.clone());
@@ -283,27 +289,83 @@ fn paint<L: LookUp>(look_up: L, mut band: Band<'_>, desk: &mut Desk) {
     }
 }
 
+/// What each row of a band sees of floor or ceiling, if it does.
+#[inline(always)]
+fn room<'a>(band: &Band<'a>, rows: usize) -> Vec<PlaneRow<'a>> {
+    let planes = [false, true].map(|ceiling| Plane::new(band.scene, band.frame, u32::from(ceiling), ceiling));
+    let rows = &band.frame.rows[band.first_row..band.first_row + rows];
+    rows.iter().map(|row| planes[usize::from(row.tan >= 0.0)].row(band.scene, band.frame, row, row.plane)).collect()
+}
+
+/// From the first row of some tasks to the last; empty where there is none.
+#[inline(always)]
+fn rows_of(tasks: &[Task<'_>]) -> Range<usize> {
+    let start = tasks.iter().map(|task| task.start).min().unwrap_or(0);
+    start..tasks.iter().map(|task| task.start + task.run.count).max().unwrap_or(0)
+}
+
+/// Does some tasks, at most [`LANES`]. The texels of each are brought before the one ahead of it is shaded: what was just written
+/// takes long to load, and what is far away in memory, longer.
+#[inline(always)]
+fn shade_sides<L: LookUp>(look_up: L, band: &Band<'_>, desk: &mut Desk, tasks: &[Task<'_>]) {
+    let (scene, frame) = (band.scene, band.frame);
+    let sides = Sides::new(scene, frame, std::array::from_fn(|k| &tasks[k.min(tasks.len() - 1)].run));
+    for k in 0..=tasks.len() {
+        if tasks.get(k).is_some_and(|task| task.sees_side) {
+            sides.at(k).mix(frame, &mut desk.strips[k % 2]);
+        }
+        let Some(ahead) = k.checked_sub(1) else { continue };
+        let task = &tasks[ahead];
+        let colours = &mut desk.columns.0[task.column % LANES][task.start..];
+        if task.sees_side {
+            sides.at(ahead).shade(look_up, scene, frame, &mut desk.strips[ahead % 2], &mut desk.light, colours);
+        } else {
+            colours[..task.run.count].fill(VOID);
+        }
+    }
+}
+
 /// Shades the horizontal surfaces that a group of columns sees.
 #[inline(always)]
-fn shade_levels<L: LookUp>(look_up: L, band: &Band<'_>, desk: &mut Desk, group: Range<usize>, first: usize) {
+fn shade_levels<L: LookUp>(
+    look_up: L,
+    band: &Band<'_>,
+    room: &[PlaneRow<'_>],
+    desk: &mut Desk,
+    group: Range<usize>,
+    first: usize,
+) {
     let frame = band.frame;
     let (mut x, mut y) = ([0.0; POINTS], [0.0; POINTS]);
     for (k, direction) in frame.directions[group.clone()].iter().take(POINTS).enumerate() {
         [x[k], y[k]] = *direction;
     }
-    let masks = desk.masks.chunks_exact(desk.first_change.len());
+    let masks = desk.masks.chunks_exact(desk.first_change.len() + 1);
     for (level, masks) in desk.levels.iter().zip(masks) {
         let height = level.plane.height() - frame.params.camera_height;
         let rows = desk.colours.chunks_exact_mut(desk.stride).enumerate();
+        let mut wanted = 0;
         for (number, colours) in rows.take(level.rows.end).skip(level.rows.start) {
-            let row = &frame.rows[band.first_row + number];
-            let t = if level.surface < 2 { row.plane } else { height * row.inverse_tan };
-            let sight = Sight { scene: band.scene, frame, row, t };
-            if let Some(colours) = colours[group.start - first..].first_chunk_mut() {
-                level.plane.shade(look_up, sight, [&x, &y], masks[number], &mut desk.point, colours);
-            }
+            wanted ^= masks[number];
+            let Some(colours) = colours[group.start - first..].first_chunk_mut() else { continue };
+            let own;
+            let row = if level.surface < 2 {
+                &room[number]
+            } else {
+                let row = &frame.rows[band.first_row + number];
+                own = level.plane.row(band.scene, frame, row, height * row.inverse_tan);
+                &own
+            };
+            row.shade(look_up, frame, [&x, &y], wanted, &mut desk.points, colours);
         }
     }
+}
+
+/// What the columns see, on AVX2, for wider vectors gain nothing here.
+#[multiversion::multiversion(targets("x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"))]
+fn find_avx2(frame: &Frame, hits: &mut ColumnHits, spans: &mut Spans) {
+    hits.find(frame);
+    spans.find(frame, hits);
 }
 
 #[multiversion::multiversion(targets("x86_64+avx2+bmi1+bmi2+lzcnt+popcnt"))]
@@ -317,17 +379,17 @@ fn paint_avx512(look_up: Gathered, band: Band<'_>, desk: &mut Desk) {
     paint(look_up, band, desk);
 }
 
-/// Rows of a column to be shaded: they see an upright face, or nothing.
-struct Run<'a> {
+/// Rows of a column, from `start` of the band on, that see an upright face, or nothing.
+struct Task<'a> {
     column: usize,
     start: usize,
-    count: usize,
-    side: Option<Side<'a>>,
+    sees_side: bool,
+    run: Run<'a>,
 }
 
-/// Notes what a column shows. Texels of upright faces are asked for, so that they are there when the runs are shaded.
+/// Notes what a column shows, and what is to be done for it.
 #[inline(always)]
-fn lay_out<'a>(band: &Band<'a>, desk: &mut Desk, rows: usize, column: usize, first: usize, runs: &mut Vec<Run<'a>>) {
+fn lay_out<'a>(band: &Band<'a>, desk: &mut Desk, rows: usize, column: usize, first: usize, tasks: &mut Vec<Task<'a>>) {
     let (frame, eye) = (band.frame, band.frame.params.camera_height);
     let hits = band.hits.of(column);
     for span in band.spans.of(column) {
@@ -337,24 +399,23 @@ fn lay_out<'a>(band: &Band<'a>, desk: &mut Desk, rows: usize, column: usize, fir
             continue;
         }
         let hit = hits.get(usize::from(span.hit));
-        let mut shown = Shown { instance: (span.surface + 1) as u16, ..Shown::default() };
-        match (span.face, hit) {
-            (Face::Side, Some(hit)) => shown.near = hit.near,
-            (Face::Top, Some(hit)) => shown.height = hit.top - eye,
-            (Face::Underside, Some(hit)) => shown.height = hit.bottom - eye,
-            (_, None) => shown.room = 1.0,
-        }
+        let (distance, unit) = match (span.face, hit) {
+            (Face::Side, Some(hit)) => (hit.near, Unit::Metre),
+            (Face::Top, Some(hit)) => (hit.top - eye, Unit::InverseTan),
+            (Face::Underside, Some(hit)) => (hit.bottom - eye, Unit::InverseTan),
+            (_, None) => (1.0, Unit::Plane),
+        };
+        let shown = Shown { distance, unit, instance: (span.surface + 1) as u16 };
         let next = desk.first_change[start];
         desk.changes.push(Change { next, column: (column - first) as u16, shown });
         desk.first_change[start] = desk.changes.len() as u32;
-        let count = end - start;
+        let task = |sees_side, hit| {
+            let run = Run { hit, direction: frame.directions[column], first_row: band.first_row + start, count: end - start };
+            Task { column, start, sees_side, run }
+        };
         match (span.face, hit) {
-            (Face::Side, Some(hit)) => {
-                let side = Side::new(band.scene, frame, hit, frame.directions[column], band.first_row + start, count);
-                side.fetch();
-                runs.push(Run { column, start, count, side: Some(side) });
-            }
-            _ if span.surface == NOTHING => runs.push(Run { column, start, count, side: None }),
+            (Face::Side, Some(hit)) => tasks.push(task(true, hit)),
+            _ if span.surface == NOTHING => tasks.push(task(false, Hit::NONE)),
             _ => note_level(band, desk, span.surface, span.face, start..end, column - first),
         }
     }
@@ -368,13 +429,14 @@ fn note_level(band: &Band<'_>, desk: &mut Desk, surface: u32, face: Face, rows: 
     let k = known.unwrap_or_else(|| {
         let plane = Plane::new(band.scene, band.frame, surface, face == Face::Underside);
         desk.levels.push(Level { surface, face, plane, rows: rows.clone() });
-        desk.masks.resize(desk.masks.len() + all_rows, 0);
+        desk.masks.resize(desk.masks.len() + all_rows + 1, 0);
         desk.levels.len() - 1
     });
     let level = &mut desk.levels[k];
     level.rows = level.rows.start.min(rows.start)..level.rows.end.max(rows.end);
-    for mask in &mut desk.masks[k * all_rows..][rows] {
-        *mask |= 1 << (column % POINTS);
+    let changes = &mut desk.masks[k * (all_rows + 1)..][..=all_rows];
+    for row in [rows.start, rows.end] {
+        changes[row] ^= 1 << (column % POINTS);
     }
 }
 

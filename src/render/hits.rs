@@ -1,6 +1,7 @@
 //! The hits of all columns at once: each wall and body is projected into the columns that it spans, and only those test it.
 //!
 //! The tests themselves are those of [`super::columns`]; the projection merely leaves out columns in which they would fail.
+//! Functions are inlined throughout, so that they are compiled for the vector unit of their caller.
 
 use std::ops::Range;
 
@@ -16,13 +17,15 @@ pub(super) struct ColumnHits {
 }
 
 impl ColumnHits {
+    #[inline(always)]
     pub fn of(&self, column: usize) -> &[Hit] {
         &self.hits[column * MAX_HITS..][..self.counts[column] as usize]
     }
 
+    #[inline(always)]
     pub fn find(&mut self, frame: &Frame) {
         let width = frame.params.width as usize;
-        self.hits.resize(width * MAX_HITS, Hit::NONE);
+        self.hits.resize(width * MAX_HITS, *Hit::NONE);
         self.counts.clear();
         self.counts.resize(width, 0);
         let wall_count = frame.params.wall_count as usize;
@@ -51,6 +54,7 @@ impl ColumnHits {
     }
 
     /// Inserts a body before the wall of its column, and cuts it off there.
+    #[inline(always)]
     fn insert(&mut self, column: usize, hit: Hit, wall_count: u32) {
         let hits = &mut self.hits[column * MAX_HITS..][..MAX_HITS];
         let mut count = self.counts[column] as usize;
@@ -77,6 +81,7 @@ impl ColumnHits {
     }
 }
 
+#[inline(always)]
 fn corners(edge: &Edge) -> (Vector2<f64>, Vector2<f64>) {
     let [n, t] = [edge.normal, edge.tangent].map(|v| Vector2::new(f64::from(v[0]), f64::from(v[1])));
     let a = n * f64::from(edge.distance) + t * f64::from(edge.along);
@@ -84,6 +89,7 @@ fn corners(edge: &Edge) -> (Vector2<f64>, Vector2<f64>) {
 }
 
 /// Columns that may see body `k`, each once.
+#[inline(always)]
 fn body_span(frame: &Frame, k: usize) -> impl Iterator<Item = usize> + use<> {
     const CLOSE: f64 = 1e-3;
     let body = &frame.bodies[k];
@@ -108,6 +114,7 @@ fn body_span(frame: &Frame, k: usize) -> impl Iterator<Item = usize> + use<> {
 }
 
 /// Columns that look between the outermost of some points, which together span less than half a turn; one more on each side.
+#[inline(always)]
 fn span(frame: &Frame, points: impl Iterator<Item = Vector2<f64>>) -> Columns {
     let width = frame.params.width as usize;
     let per_rad = f64::from(frame.params.width) / std::f64::consts::TAU;
@@ -130,6 +137,7 @@ fn span(frame: &Frame, points: impl Iterator<Item = Vector2<f64>>) -> Columns {
     Columns { range: first..first + count as usize, width }
 }
 
+#[inline(always)]
 fn all(frame: &Frame) -> Columns {
     let width = frame.params.width as usize;
     Columns { range: 0..width, width }
@@ -144,6 +152,7 @@ struct Columns {
 impl Iterator for Columns {
     type Item = usize;
 
+    #[inline(always)]
     fn next(&mut self) -> Option<usize> {
         let column = self.range.next()?;
         Some(if column >= self.width { column - self.width } else { column })

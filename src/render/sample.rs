@@ -7,7 +7,7 @@
 //! is sampled at once. Functions are inlined throughout, so that they run on the vector unit that their caller was compiled for.
 
 use super::scene::{Material, MipLevel};
-use super::texels::{Block, LookUp, Pair, Texels, fetch, pairs};
+use super::texels::{Block, LookUp, Pair, Texels, pairs, whole};
 
 pub(super) use super::texels::LANES;
 
@@ -37,8 +37,8 @@ pub(super) fn footprint(material: &Material, [u_m, v_m]: [f32; 2]) -> f32 {
 
 /// The same where u is seen at a slant and v is not, and [`REACH`] asks that v is never undersampled.
 #[inline(always)]
-pub(super) fn strip_footprint(material: &Material, [u_m, v_m]: [f32; 2]) -> f32 {
-    (0.5 * (u_m * material.tiles_per_m[0])).max(v_m * material.tiles_per_m[1])
+fn strip_footprint([u_per_m, v_per_m]: [f32; 2], [u_m, v_m]: [f32; 2]) -> f32 {
+    (0.5 * (u_m * u_per_m)).max(v_m * v_per_m)
 }
 
 /// The level for a pixel that covers so much of a tile: 1.06 to 1.34 texels of it are a pixel. The logarithm is read off the bits
@@ -46,24 +46,35 @@ pub(super) fn strip_footprint(material: &Material, [u_m, v_m]: [f32; 2]) -> f32 
 /// rounding makes up.
 #[inline(always)]
 pub(super) fn level(material: &Material, footprint: f32) -> MipLevel {
+    let number = level_number(footprint * material.levels[0].size as f32, material.last_level as i32);
+    material.levels[number as usize]
+}
+
+/// Its number, for a pixel that covers so many texels of the finest level; `last` is the number of the coarsest.
+#[inline(always)]
+fn level_number(texels: f32, last: i32) -> i32 {
     /// Half of 0.086, less half a quarter.
     const ROUNDING: i32 = (-0.082 * (1 << 23) as f32) as i32;
-    let texels = footprint * material.levels[0].size as f32;
     let logarithm = (texels.to_bits() as i32).wrapping_sub(1.0_f32.to_bits() as i32);
-    material.levels[(logarithm.saturating_add(ROUNDING) >> 21).clamp(0, material.last_level as i32) as usize]
+    (logarithm.wrapping_add(ROUNDING) >> 21).max(0).min(last)
 }
 
 /// A length on a surface in tiles, less whole ones, along u (`axis` 0) or v (1).
 #[inline(always)]
 pub(super) fn within_tile(length_m: f32, material: &Material, axis: usize) -> f32 {
-    let tiles = length_m * material.tiles_per_m[axis];
-    tiles - tiles.floor()
+    fraction(length_m * material.tiles_per_m[axis])
 }
 
-/// A coordinate on a level, in 1/256 texel and from the centre of its first texel, of a place within the tile.
+/// A number less whole ones.
 #[inline(always)]
-fn coordinate(within_tile: f32, level: MipLevel) -> i32 {
-    (within_tile * level.size as f32 * 256.0) as i32 - 128
+fn fraction(x: f32) -> f32 {
+    x - x.floor()
+}
+
+/// A coordinate on a level of this size, in 1/256 texel and from the centre of its first texel, of a place within the tile.
+#[inline(always)]
+fn coordinate(within_tile: f32, size: f32) -> i32 {
+    whole(within_tile * size * 256.0) - 128
 }
 
 /// The same of any place, given in texels of the level: whole tiles are taken away. At its edge it does not matter which of the
@@ -151,17 +162,6 @@ impl<'a> Lines<'a> {
         place.rem_euclid(self.length as i32) as usize
     }
 
-    /// Asks for `count` texels from `from` on.
-    #[inline(always)]
-    fn fetch(&self, from: i32, count: usize) {
-        let from = self.within(from);
-        for k in (0..count.min(self.length) + LANES).step_by(LANES) {
-            let at = if from + k < self.length { from + k } else { (from + k - self.length).min(self.length) };
-            fetch(&self.first[at..]);
-            fetch(&self.second[at..]);
-        }
-    }
-
     /// Mixes the lines by means alone, from texel `from` on. Whole blocks are written, up to one more than is asked for.
     #[inline(always)]
     fn mix(&self, from: i32, count: usize, out: &mut [u32]) {
@@ -189,11 +189,15 @@ impl<'a> Lines<'a> {
         let choose = |bit: u32| if self.weight >> bit & 1 == 0 { a } else { b };
         let [w, x, y, z] = [choose(0), choose(1), choose(2), choose(3)];
         for (((((a, w), x), y), z), out) in a.iter().zip(w).zip(x).zip(y).zip(z).zip(out) {
-            let [a, w, x, y, z] = [a, w, x, y, z].map(bytes);
-            let out = bytes_mut(out);
-            for k in 0..4 * LANES {
-                out[k] = mean(mean(mean(mean(a[k], w[k]), x[k]), y[k]), z[k]);
+            // One mean after the other, for the compiler makes bytes of none but the first when they are one expression.
+            let mut mixed = *bytes(a);
+            for line in [w, x, y, z] {
+                let line = bytes(line);
+                for k in 0..4 * LANES {
+                    mixed[k] = mean(mixed[k], line[k]);
+                }
             }
+            *bytes_mut(out) = mixed;
         }
     }
 }
@@ -210,46 +214,96 @@ fn bytes_mut(block: &mut Block) -> &mut [u8; 4 * LANES] {
     bytemuck::cast_mut(block)
 }
 
-/// Where the texels lie that a run of rows needs. Looking texels up mostly runs one by one, calculating with them in vectors: each is
-/// done for the whole run before the other, for a vector that was just written in parts takes long to load.
+/// Where the texels lie that a run of rows needs.
 #[derive(Debug)]
+#[repr(C, align(64))]
 pub(super) struct StripRoom {
+    /// Of the lines that the run lies between, mixed.
     texels: [u32; REACH + 2 * LANES],
-    places: [Block; RUN / LANES],
+    /// Block by block those on either side of each row, where they are not used at once.
     pairs: [[Pair; LANES]; RUN / LANES],
 }
 
 impl Default for StripRoom {
     fn default() -> Self {
-        Self { texels: [0; REACH + 2 * LANES], places: [[0; LANES]; RUN / LANES], pairs: [[[0; 2]; LANES]; RUN / LANES] }
+        Self { texels: [0; REACH + 2 * LANES], pairs: [[[0; 2]; LANES]; RUN / LANES] }
+    }
+}
+
+/// What some columns see of upright surfaces, a lane each.
+#[derive(Debug)]
+pub(super) struct StripPlaces<'a> {
+    pub material: [&'a Material; LANES],
+    /// Where along the surface, m.
+    pub u: [f32; LANES],
+    /// How high on it in row 0 of the picture, m, and how far it falls from row to row, which is what a pixel covers along v.
+    pub v: [f32; LANES],
+    pub step: [f32; LANES],
+    /// What a pixel covers along u, m.
+    pub slant: [f32; LANES],
+    /// The first row that is asked for.
+    pub first_row: [i32; LANES],
+}
+
+/// Textures along some columns of upright surfaces, a lane each; see [`Strip`].
+#[derive(Debug)]
+pub(super) struct Strips<'a> {
+    atlas: &'a [u32],
+    level: [MipLevel; LANES],
+    u: [i32; LANES],
+    v: [i32; LANES],
+    step: [i32; LANES],
+}
+
+impl<'a> Strips<'a> {
+    #[inline(always)]
+    pub fn new(atlas: &'a [u32], places: &StripPlaces<'a>) -> Self {
+        let StripPlaces { material, u, v, step, slant, first_row } = places;
+        let (mut tiles_per_m, mut size, mut last) = ([[0.0; LANES]; 2], [0.0; LANES], [0; LANES]);
+        for (k, material) in material.iter().enumerate() {
+            [tiles_per_m[0][k], tiles_per_m[1][k]] = material.tiles_per_m;
+            (size[k], last[k]) = (material.levels[0].size as f32, material.last_level as i32);
+        }
+        let mut number = [0; LANES];
+        for k in 0..LANES {
+            let footprint = strip_footprint([tiles_per_m[0][k], tiles_per_m[1][k]], [slant[k], step[k]]);
+            number[k] = level_number(footprint * size[k], last[k]);
+        }
+        let mut level = [MipLevel { base: 0, size: 0 }; LANES];
+        for (k, level) in level.iter_mut().enumerate() {
+            *level = material[k].levels[number[k] as usize];
+            size[k] = level.size as f32;
+        }
+        let mut strips = Self { atlas, level, u: [0; LANES], v: [0; LANES], step: [0; LANES] };
+        for k in 0..LANES {
+            strips.u[k] = coordinate(fraction(u[k] * tiles_per_m[0][k]), size[k]);
+            strips.step[k] = whole(step[k] * tiles_per_m[1][k] * size[k] * -65536.0);
+            let v = whole(fraction(v[k] * tiles_per_m[1][k]) * size[k] * 65536.0);
+            strips.v[k] = v.wrapping_add(strips.step[k].wrapping_mul(first_row[k]));
+        }
+        strips
+    }
+
+    /// One of them.
+    #[inline(always)]
+    pub fn at(&self, k: usize) -> Strip<'a> {
+        Strip { atlas: self.atlas, level: self.level[k], u: self.u[k], v: self.v[k], step: self.step[k] }
     }
 }
 
 /// A texture along a column of an upright surface: u and level of detail are fixed, v falls evenly from row to row.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Strip<'a> {
-    pub atlas: &'a [u32],
-    pub material: &'a Material,
-    /// In tiles, within one.
-    pub u: f32,
+    atlas: &'a [u32],
     level: MipLevel,
+    /// In 1/256 texel.
+    u: i32,
     /// v of the first row, and its change from row to row, in 1/65536 texel of the level.
     v: i32,
     step: i32,
 }
 
 impl<'a> Strip<'a> {
-    /// `u_m`, and `v_m` at row 0 of the picture; v falls by `step_m` a row. `level` comes from [`strip_footprint`] with `step_m`
-    /// along v. `row` is the first that is asked for.
-    #[inline(always)]
-    pub fn new(atlas: &'a [u32], material: &'a Material, [u_m, v_m, step_m]: [f32; 3], level: MipLevel, row: usize) -> Self {
-        let size = level.size as f32;
-        let step = (step_m * material.tiles_per_m[1] * size * -65536.0) as i32;
-        let v = (within_tile(v_m, material, 1) * size * 65536.0) as i32;
-        let v = v.wrapping_add(step.wrapping_mul(row as i32));
-        Self { atlas, material, u: within_tile(u_m, material, 0), level, v, step }
-    }
-
     /// Coordinate of a row, in 1/256 texel.
     #[inline(always)]
     fn at(&self, row: usize) -> i32 {
@@ -259,7 +313,7 @@ impl<'a> Strip<'a> {
     /// The lines of texels that it runs along.
     #[inline(always)]
     fn lines(&self) -> Lines<'a> {
-        Lines::new(self.atlas, self.level, coordinate(self.u, self.level))
+        Lines::new(self.atlas, self.level, self.u)
     }
 
     /// The lowest texel that `count` rows look at, and how many there are. A level of one texel may have rows that see the
@@ -270,43 +324,56 @@ impl<'a> Strip<'a> {
         (lowest, (((self.at(0) >> 8).wrapping_sub(lowest)) as u32 as usize).min(REACH - 1) + 2)
     }
 
-    /// Asks for the texels of `count` rows.
+    /// Mixes the lines that it lies between, as far as so many blocks of rows see them.
     #[inline(always)]
-    pub fn fetch(&self, count: usize) {
-        let (lowest, span) = self.reach(count);
-        self.lines().fetch(lowest, span);
+    pub fn mix(&self, blocks: usize, room: &mut StripRoom) {
+        let (lowest, span) = self.reach(LANES * blocks);
+        self.lines().mix(lowest, span, &mut room.texels);
     }
 
-    /// Colours of as many rows as there is `light` for.
+    /// Colours of as many rows as there is `light` for, those that [`Strip::mix`] was told.
     #[inline(always)]
     pub fn shade<L: LookUp>(&self, look_up: L, light: &[[f32; LANES]], room: &mut StripRoom, out: &mut [Block]) {
-        let count = LANES * light.len();
-        let (lowest, span) = self.reach(count);
-        let StripRoom { texels, places, pairs: found } = room;
-        self.lines().mix(lowest, span, texels);
-        let (places, found) = (&mut places[..light.len()], &mut found[..light.len()]);
-        for (k, place) in places.as_flattened_mut().iter_mut().enumerate() {
-            *place = (self.at(k) >> 8).wrapping_sub(lowest) as u32;
-        }
-        for (found, places) in found.iter_mut().zip(&*places) {
-            pairs::<REACH, _>(look_up, texels, places, found);
-        }
-        for (block, ((pairs, light), out)) in found.iter().zip(light).zip(out).enumerate() {
-            let (mut near, mut far, mut weight) = ([0; LANES], [0; LANES], [0; LANES]);
-            for k in 0..LANES {
-                near[k] = pairs[k][0];
-                far[k] = pairs[k][1];
-                weight[k] = twice(self.at(LANES * block + k) & 255);
+        let (lowest, _) = self.reach(LANES * light.len());
+        let StripRoom { texels, pairs: found } = room;
+        let find = |block: usize, found: &mut [Pair; LANES]| {
+            let places = std::array::from_fn(|k| (self.at(LANES * block + k) >> 8).wrapping_sub(lowest) as u32);
+            pairs::<REACH, _>(look_up, texels, &places, found);
+        };
+        let blocks = light.iter().zip(out).enumerate();
+        if L::AT_ONCE {
+            for (block, (light, out)) in blocks {
+                let mut found = [[0; 2]; LANES];
+                find(block, &mut found);
+                self.shade_block(block, &found, light, out);
             }
-            let factor = factors(light);
-            let [near, far, weight, factor]: [&Channels; 4] = [&near, &far, &weight, &factor].map(bytemuck::cast_ref);
-            let words: &mut Channels = bytemuck::cast_mut(out);
-            for k in 0..2 * LANES {
-                let low = weigh(near[k] & 255, far[k] & 255, weight[k]);
-                words[k] = lit(low, weigh(near[k] >> 8, far[k] >> 8, weight[k]), factor[k]);
+        } else {
+            for (block, found) in found.iter_mut().enumerate().take(light.len()) {
+                find(block, found);
             }
-            opaque(out);
+            for ((block, (light, out)), found) in blocks.zip(found) {
+                self.shade_block(block, found, light, out);
+            }
         }
+    }
+
+    /// Colours of a block of rows whose texels have been looked up.
+    #[inline(always)]
+    fn shade_block(&self, block: usize, pairs: &[Pair; LANES], light: &[f32; LANES], out: &mut Block) {
+        let (mut near, mut far, mut weight) = ([0; LANES], [0; LANES], [0; LANES]);
+        for k in 0..LANES {
+            near[k] = pairs[k][0];
+            far[k] = pairs[k][1];
+            weight[k] = twice(self.at(LANES * block + k) & 255);
+        }
+        let factor = factors(light);
+        let [near, far, weight, factor]: [&Channels; 4] = [&near, &far, &weight, &factor].map(bytemuck::cast_ref);
+        let words: &mut Channels = bytemuck::cast_mut(out);
+        for k in 0..2 * LANES {
+            let low = weigh(near[k] & 255, far[k] & 255, weight[k]);
+            words[k] = lit(low, weigh(near[k] >> 8, far[k] >> 8, weight[k]), factor[k]);
+        }
+        opaque(out);
     }
 }
 
@@ -315,6 +382,7 @@ pub(super) const POINTS: usize = 4 * LANES;
 
 /// Where the texels lie that some points need.
 #[derive(Debug)]
+#[repr(C, align(64))]
 pub(super) struct PointRoom {
     /// Block by block the texels on either side of each point along u.
     pairs: [[[Pair; LANES]; 2]; POINTS / LANES],
@@ -329,8 +397,7 @@ impl Default for PointRoom {
 /// A texture at points that share a level of detail: what a row sees of a horizontal surface.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Points<'a> {
-    pub atlas: &'a [u32],
-    pub level: MipLevel,
+    pub texels: Texels<'a>,
     /// In 1/256 texel; see [`wrapped`].
     pub u: &'a [i32; POINTS],
     pub v: &'a [i32; POINTS],
@@ -348,7 +415,7 @@ impl Points<'_> {
     /// Looks up the texels of the blocks that have a bit in `wanted`.
     #[inline(always)]
     pub fn look_up<L: LookUp>(&self, look_up: L, wanted: u64, room: &mut PointRoom) {
-        let texels = Texels::new(self.atlas, self.level);
+        let texels = self.texels;
         for (block, pairs) in room.pairs.iter_mut().enumerate() {
             if !is_wanted(wanted, block) {
                 continue;
@@ -420,7 +487,7 @@ impl Taps {
 /// pixel.
 #[inline(always)]
 pub(super) fn shade_point(atlas: &[u32], level: MipLevel, [u, v]: [f32; 2], light: f32) -> u32 {
-    let (u, v) = (coordinate(u, level), coordinate(v, level));
+    let (u, v) = (coordinate(u, level.size as f32), coordinate(v, level.size as f32));
     let texels = Texels::new(atlas, level);
     let [near, far] = texels.square(texels.place((u >> 8) as u32, (v >> 8) as u32));
     let factor = factors(&[light; LANES])[0] as u16;
@@ -451,10 +518,13 @@ mod tests {
         let level = MipLevel { base: 0, size: 1 };
         let material = Material { tiles_per_m: [1.0; 2], last_level: 0, padding: 0, levels: [level; LEVELS] };
         for tenths in 20..60 {
-            let strip = Strip::new(&[GREY; 9 + 2 * LANES], &material, [0.3, 0.7, 0.1 * tenths as f32], level, 0);
+            let [u, v, step, slant] = [0.3, 0.7, 0.1 * tenths as f32, 0.0].map(|x| [x; LANES]);
+            let places = StripPlaces { material: [&material; LANES], u, v, step, slant, first_row: [0; LANES] };
+            let strip = Strips::new(&[GREY; 9 + 2 * LANES], &places).at(0);
             let mut room = StripRoom::default();
             room.texels.fill(u32::MAX);
             let mut out = [[0; LANES]; RUN / LANES];
+            strip.mix(RUN / LANES, &mut room);
             strip.shade(OneByOne, &[[1.0; LANES]; RUN / LANES], &mut room, &mut out);
             let other = out.as_flattened().iter().position(|colour| *colour != GREY);
             assert_eq!(other, None, "{tenths}");

@@ -8,10 +8,11 @@ use super::Scene;
 use super::columns::Hit;
 use super::frame::{Edge, Frame, Lamp, Row};
 use super::sample::{
-    LANES, POINTS, PointRoom, Points, RUN, Strip, StripRoom, footprint, is_wanted, level, shade_point, strip_footprint,
+    LANES, POINTS, PointRoom, Points, RUN, Strip, StripPlaces, StripRoom, Strips, footprint, is_wanted, level, shade_point,
     within_tile, wrapped,
 };
-use super::texels::LookUp;
+use super::scene::MipLevel;
+use super::texels::{LookUp, Texels};
 
 /// Least distance from a lamp that counts, squared, m^2: a lamp is no point.
 const LAMP_SIZE_SQUARED: f32 = 0.01;
@@ -63,81 +64,126 @@ fn depth_at_wall(frame: &Frame, edge: &Edge, [x, y]: [f32; 2], normal: [f32; 2])
     if before > -BEHIND { depth } else { 0.0 }
 }
 
-/// Where the sides of a column are shaded.
-#[derive(Debug)]
-pub(super) struct SideRoom {
-    strip: StripRoom,
-    light: [f32; RUN],
+/// Rows of a column that see the side of a wall or body.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Run<'a> {
+    pub hit: &'a Hit,
+    /// Where the column looks.
+    pub direction: [f32; 2],
+    pub first_row: usize,
+    /// At most [`RUN`].
+    pub count: usize,
 }
 
-impl Default for SideRoom {
-    fn default() -> Self {
-        Self { strip: StripRoom::default(), light: [0.0; RUN] }
+/// The sides that some runs see, a lane each: what the rows of each have in common is found for all of them at once.
+#[derive(Debug)]
+pub(super) struct Sides<'a> {
+    runs: [&'a Run<'a>; LANES],
+    strips: Strips<'a>,
+    /// Length on them that a pixel covers sideways, m.
+    slant: [f32; LANES],
+}
+
+impl<'a> Sides<'a> {
+    #[inline(always)]
+    pub fn new(scene: &'a Scene, frame: &Frame, runs: [&'a Run<'a>; LANES]) -> Self {
+        let mut material = [&scene.materials[0]; LANES];
+        let [mut cosine, mut near, mut u, mut bottom, mut step, mut slant, mut v] = [[0.0_f32; LANES]; 7];
+        let mut first_row = [0; LANES];
+        for (k, run) in runs.into_iter().enumerate() {
+            let Run { hit, direction, .. } = run;
+            material[k] = &scene.materials[hit.surface as usize];
+            cosine[k] = -(hit.normal[0] * direction[0] + hit.normal[1] * direction[1]);
+            (near[k], u[k], bottom[k], first_row[k]) = (hit.near, hit.u, hit.bottom, run.first_row as i32);
+        }
+        let (eye, tan) = (frame.params.camera_height, frame.rows[0].tan);
+        for k in 0..LANES {
+            step[k] = near[k] * frame.params.pixel_rad;
+            slant[k] = step[k] / cosine[k].max(LEAST_COSINE);
+            v[k] = eye + near[k] * tan - bottom[k].max(0.0);
+        }
+        let places = StripPlaces { material, u, v, step, slant, first_row };
+        Self { runs, strips: Strips::new(&scene.atlas, &places), slant }
+    }
+
+    /// One of them.
+    #[inline(always)]
+    pub fn at(&self, k: usize) -> Side<'a> {
+        Side { run: self.runs[k], strip: self.strips.at(k), slant: self.slant[k] }
     }
 }
 
-/// The side of a wall or body as some rows of a column see it, with what they have in common.
+/// The side that a run sees.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Side<'a> {
-    hit: &'a Hit,
-    direction: [f32; 2],
-    first_row: usize,
-    count: usize,
+    run: &'a Run<'a>,
     /// Its texture where the rows are even in the tangent of elevation; then all have one level of detail.
     strip: Strip<'a>,
-    /// Length on it that a pixel covers sideways, m.
     slant: f32,
 }
 
-impl<'a> Side<'a> {
-    /// The rows from `first_row` to `first_row + count` of a column that looks along `direction`; at most [`RUN`].
+impl Side<'_> {
+    /// Brings the texels that [`Side::shade`] needs.
     #[inline(always)]
-    pub fn new(scene: &'a Scene, frame: &'a Frame, hit: &'a Hit, direction: [f32; 2], first_row: usize, count: usize) -> Self {
-        let material = &scene.materials[hit.surface as usize];
-        let cosine = -(hit.normal[0] * direction[0] + hit.normal[1] * direction[1]);
-        let across = hit.near * frame.params.pixel_rad;
-        let slant = across / cosine.max(LEAST_COSINE);
-        let level = level(material, strip_footprint(material, [slant, across]));
-        let v = frame.params.camera_height + hit.near * frame.rows[0].tan - hit.bottom.max(0.0);
-        let strip = Strip::new(&scene.atlas, material, [hit.u, v, across], level, first_row);
-        Self { hit, direction, first_row, count, strip, slant }
-    }
-
-    /// Asks for the texels.
-    #[inline(always)]
-    pub fn fetch(&self) {
-        self.strip.fetch(self.count);
-    }
-
-    /// Colours of the rows. What follows in `out` up to a whole number of blocks is overwritten, too.
-    #[inline(always)]
-    pub fn shade<L: LookUp>(&self, look_up: L, frame: &Frame, room: &mut SideRoom, out: &mut [u32]) {
-        self.light(frame, &mut room.light[..self.count]);
+    pub fn mix(&self, frame: &Frame, room: &mut StripRoom) {
         if frame.params.equal_angle == 0 {
-            let blocks = self.count.div_ceil(LANES);
-            let (light, out) = (room.light.as_chunks().0, out.as_chunks_mut().0);
-            self.strip.shade(look_up, &light[..blocks], &mut room.strip, &mut out[..blocks]);
+            self.strip.mix(self.run.count.div_ceil(LANES), room);
+        }
+    }
+
+    /// Colours of the rows. What follows in `out` up to a whole number of blocks is overwritten, too. `room` is as [`Side::mix`] left it.
+    #[inline(always)]
+    pub fn shade<L: LookUp>(
+        &self,
+        look_up: L,
+        scene: &Scene,
+        frame: &Frame,
+        room: &mut StripRoom,
+        light: &mut Light,
+        out: &mut [u32],
+    ) {
+        let run = self.run;
+        let blocks = run.count.div_ceil(LANES);
+        let light = &mut light.0[..blocks];
+        run.light(frame, light);
+        if frame.params.equal_angle == 0 {
+            self.strip.shade(look_up, light, room, &mut out.as_chunks_mut().0[..blocks]);
             return;
         }
         // Steps and level of detail change from row to row.
-        let Strip { atlas, material, u, .. } = self.strip;
-        let (near, foot) = (self.hit.near, self.hit.bottom.max(0.0));
-        let rows = &frame.rows[self.first_row..self.first_row + self.count];
-        for ((colour, row), light) in out.iter_mut().zip(rows).zip(&room.light) {
+        let material = &scene.materials[run.hit.surface as usize];
+        let (near, foot) = (run.hit.near, run.hit.bottom.max(0.0));
+        let u = within_tile(run.hit.u, material, 0);
+        let rows = &frame.rows[run.first_row..run.first_row + run.count];
+        for ((colour, row), light) in out.iter_mut().zip(rows).zip(light.as_flattened()) {
             let high = near * frame.params.pixel_rad * row.stretch * row.stretch;
             let level = level(material, footprint(material, [self.slant, high]));
             let v = within_tile(frame.params.camera_height + near * row.tan - foot, material, 1);
-            *colour = shade_point(atlas, level, [u, v], *light);
+            *colour = shade_point(&scene.atlas, level, [u, v], *light);
         }
     }
+}
 
-    /// Light on the rows.
+/// Light on the rows of a run, block by block.
+#[derive(Debug)]
+#[repr(align(64))]
+pub(super) struct Light([[f32; LANES]; RUN / LANES]);
+
+impl Default for Light {
+    fn default() -> Self {
+        Self([[0.0; LANES]; RUN / LANES])
+    }
+}
+
+impl Run<'_> {
+    /// Light on the rows, of which the last block may be more.
     #[inline(always)]
-    fn light(&self, frame: &Frame, light: &mut [f32]) {
+    fn light(&self, frame: &Frame, light: &mut [[f32; LANES]]) {
         let Self { hit, direction, first_row, count, .. } = *self;
         let eye = frame.params.camera_height;
         let rows = &frame.rows[first_row..first_row + count];
-        light.fill(frame.params.ambient);
+        light.fill([frame.params.ambient; LANES]);
+        let light = &mut light.as_flattened_mut()[..count];
         let at = hit.near;
         let point = [at * direction[0], at * direction[1]];
         if frame.params.corner_shade > 0.0 {
@@ -187,16 +233,6 @@ fn glow(frame: &Frame, surface: u32) -> f32 {
     surface.checked_sub(2 + frame.params.wall_count).map_or(0.0, |k| frame.bodies[k as usize].glow)
 }
 
-/// A row of the picture that sees a horizontal surface.
-#[derive(Clone, Copy)]
-pub(super) struct Sight<'a> {
-    pub scene: &'a Scene,
-    pub frame: &'a Frame,
-    pub row: &'a Row,
-    /// Horizontal distance at which it is met, m.
-    pub t: f32,
-}
-
 /// A horizontal surface: floor, ceiling, or the top or underside of a body.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Plane {
@@ -237,18 +273,9 @@ impl Plane {
         self.z
     }
 
-    /// Colours of some columns of a row that sees it, those that have a bit in `wanted`; they look along `x` and `y`.
+    /// What a row of the picture sees of it, that meets it at horizontal distance `t`, m.
     #[inline(always)]
-    pub fn shade<L: LookUp>(
-        &self,
-        look_up: L,
-        Sight { scene, frame, row, t }: Sight<'_>,
-        [x, y]: [&[f32; POINTS]; 2],
-        wanted: u64,
-        room: &mut PointRoom,
-        out: &mut [u32; POINTS],
-    ) {
-        let [cos, sin] = self.heading;
+    pub fn row<'a>(&self, scene: &'a Scene, frame: &Frame, row: &Row, t: f32) -> PlaneRow<'a> {
         let across = t * frame.params.pixel_rad;
         // Rows that are even in elevation are farther apart in its tangent.
         let spread = if frame.params.equal_angle == 0 { 1.0 } else { row.stretch * row.stretch };
@@ -257,30 +284,14 @@ impl Plane {
         let [u_per_m, v_per_m] = material.tiles_per_m;
         let level = level(material, (0.5 * deep.max(across)).max(deep.min(across)) * u_per_m.max(v_per_m));
         let size = level.size as f32;
-        let texels = [t * u_per_m * size, t * v_per_m * size];
-        let camera = self.camera.map(|tiles| tiles * size);
-        let (mut u, mut v) = ([0; POINTS], [0; POINTS]);
-        for k in 0..POINTS {
-            u[k] = wrapped(texels[0] * (cos * x[k] + sin * y[k]) + camera[0], level);
-            v[k] = wrapped(texels[1] * (cos * y[k] - sin * x[k]) + camera[1], level);
-        }
-        let points = Points { atlas: &scene.atlas, level, u: &u, v: &v };
-        points.look_up(look_up, wanted, room);
-        let (x, y, out) = (x.as_chunks().0, y.as_chunks().0, out.as_chunks_mut::<LANES>().0);
-        for (block, ((x, y), out)) in x.iter().zip(y).zip(out).enumerate() {
-            if !is_wanted(wanted, block) {
-                continue;
-            }
-            let mut lit = [0; LANES];
-            points.shade(block, &self.light(frame, x, y, t), room, &mut lit);
-            let wanted = (wanted >> (LANES * block)) as u16;
-            if wanted == u16::MAX {
-                *out = lit;
-            } else {
-                for k in 0..LANES {
-                    out[k] = if wanted >> k & 1 != 0 { lit[k] } else { out[k] };
-                }
-            }
+        let scale = [t * u_per_m * size, t * v_per_m * size];
+        PlaneRow {
+            plane: *self,
+            t,
+            level,
+            texels: Texels::new(&scene.atlas, level),
+            scale,
+            camera: self.camera.map(|tiles| tiles * size),
         }
     }
 
@@ -326,5 +337,58 @@ impl Plane {
             }
         }
         light
+    }
+}
+
+/// A row of the picture that sees a horizontal surface.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct PlaneRow<'a> {
+    plane: Plane,
+    /// Horizontal distance at which it is met, m.
+    t: f32,
+    level: MipLevel,
+    texels: Texels<'a>,
+    /// Texels of the level from the camera to where it is met, along the axes of the texture.
+    scale: [f32; 2],
+    /// The camera in texels.
+    camera: [f32; 2],
+}
+
+impl PlaneRow<'_> {
+    /// Colours of some columns, those that have a bit in `wanted`; they look along `x` and `y`.
+    #[inline(always)]
+    pub fn shade<L: LookUp>(
+        &self,
+        look_up: L,
+        frame: &Frame,
+        [x, y]: [&[f32; POINTS]; 2],
+        wanted: u64,
+        room: &mut PointRoom,
+        out: &mut [u32; POINTS],
+    ) {
+        let [cos, sin] = self.plane.heading;
+        let (mut u, mut v) = ([0; POINTS], [0; POINTS]);
+        for k in 0..POINTS {
+            u[k] = wrapped(self.scale[0] * (cos * x[k] + sin * y[k]) + self.camera[0], self.level);
+            v[k] = wrapped(self.scale[1] * (cos * y[k] - sin * x[k]) + self.camera[1], self.level);
+        }
+        let points = Points { texels: self.texels, u: &u, v: &v };
+        points.look_up(look_up, wanted, room);
+        let (x, y, out) = (x.as_chunks().0, y.as_chunks().0, out.as_chunks_mut::<LANES>().0);
+        for (block, ((x, y), out)) in x.iter().zip(y).zip(out).enumerate() {
+            if !is_wanted(wanted, block) {
+                continue;
+            }
+            let mut lit = [0; LANES];
+            points.shade(block, &self.plane.light(frame, x, y, self.t), room, &mut lit);
+            let wanted = (wanted >> (LANES * block)) as u16;
+            if wanted == u16::MAX {
+                *out = lit;
+            } else {
+                for k in 0..LANES {
+                    out[k] = if wanted >> k & 1 != 0 { lit[k] } else { out[k] };
+                }
+            }
+        }
     }
 }

@@ -2,7 +2,8 @@
 //!
 //! Rows look lower and lower, so that each condition that makes a face visible holds from some row on or up to some row. A
 //! column's hits are laid out in runs without looking at a single pixel; only where faces of bodies that overlap compete for
-//! the same rows are distances compared row by row.
+//! the same rows are distances compared row by row. Functions are inlined throughout, so that they are compiled for the vector unit
+//! of their caller.
 
 use std::ops::Range;
 
@@ -44,10 +45,12 @@ pub(super) struct Spans {
 }
 
 impl Spans {
+    #[inline(always)]
     pub fn of(&self, column: usize) -> &[Span] {
         &self.spans[self.starts[column] as usize..self.starts[column + 1] as usize]
     }
 
+    #[inline(always)]
     pub fn find(&mut self, frame: &Frame, hits: &ColumnHits) {
         self.finder.prepare(&frame.rows);
         self.spans.clear();
@@ -73,6 +76,7 @@ impl Spans {
     }
 
     /// A wall with nothing before it, which rows `ahead` see.
+    #[inline(always)]
     fn lay_out_wall(&mut self, wall: &Hit, ahead: &Range<usize>, room: &[Span]) {
         let (start, end) = (ahead.start as u32, ahead.end as u32);
         let above = room.iter().filter(|r| r.start < start);
@@ -85,6 +89,7 @@ impl Spans {
     }
 
     /// Nearest hits first: each takes what is left of the rows that see it.
+    #[inline(always)]
     fn lay_out(&mut self, frame: &Frame, hits: &[Hit], room: &[Span]) {
         let rows = &frame.rows;
         self.column.clear();
@@ -106,6 +111,7 @@ impl Spans {
     }
 
     /// Row by row: of all faces that a ray meets, the nearest.
+    #[inline(always)]
     fn compete(&mut self, frame: &Frame, hits: &[Hit], room: &[Span]) {
         let rows = &frame.rows;
         self.rows.clear();
@@ -133,6 +139,7 @@ impl Spans {
 }
 
 /// Horizontal distance at which a row meets a face of a hit.
+#[inline(always)]
 fn distance(frame: &Frame, hit: &Hit, face: Face, row: &Row) -> f32 {
     match face {
         Face::Side => hit.near,
@@ -142,6 +149,7 @@ fn distance(frame: &Frame, hit: &Hit, face: Face, row: &Row) -> f32 {
 }
 
 /// Ceiling, floor, and the rows near the horizon that meet neither.
+#[inline(always)]
 fn room(rows: &[Row]) -> Vec<Span> {
     let face = |row: &Row| match (row.plane < FAR, row.tan < 0.0) {
         (false, _) => (NOTHING, Face::Side),
@@ -159,7 +167,7 @@ fn room(rows: &[Row]) -> Vec<Span> {
 }
 
 /// The faces of a hit before floor and ceiling, each with the rows that would see it if nothing else were there.
-#[inline]
+#[inline(always)]
 fn faces(frame: &Frame, finder: &RowFinder, hit: &Hit, number: u8, mut show: impl FnMut(Span)) {
     let rows = &frame.rows;
     let eye = frame.params.camera_height;
@@ -187,6 +195,7 @@ fn faces(frame: &Frame, finder: &RowFinder, hit: &Hit, number: u8, mut show: imp
 }
 
 /// Gives `span` the rows that nobody has claimed.
+#[inline(always)]
 fn claim(column: &mut Vec<Span>, pieces: &mut Vec<Span>, span: Span) {
     if !column.iter().any(|c| c.hit == NO_HIT && c.start < span.end && span.start < c.end) {
         return;
@@ -210,7 +219,7 @@ fn claim(column: &mut Vec<Span>, pieces: &mut Vec<Span>, span: Span) {
 }
 
 /// The same as [`RowFinder::before_planes`], where it was `beside` a column before: most columns see a wall like their neighbours.
-#[inline]
+#[inline(always)]
 fn before_planes_beside(frame: &Frame, near: f32, beside: &Range<usize>) -> Range<usize> {
     let start = first_beside(&frame.rows, beside.start, |r| r.tan < 0.0 || r.plane > near);
     let end = first_beside(&frame.rows, beside.end, |r| r.tan < 0.0 && r.plane <= near);
@@ -218,7 +227,7 @@ fn before_planes_beside(frame: &Frame, near: f32, beside: &Range<usize>) -> Rang
 }
 
 /// The first row for which `below` holds, which it does for all rows after the first; sought from `row` on.
-#[inline]
+#[inline(always)]
 fn first_beside(rows: &[Row], mut row: usize, below: impl Fn(&Row) -> bool) -> usize {
     while row > 0 && below(&rows[row - 1]) {
         row -= 1;
@@ -239,6 +248,7 @@ struct RowFinder {
 }
 
 impl RowFinder {
+    #[inline(always)]
     fn prepare(&mut self, rows: &[Row]) {
         let (first, last) = (rows[0].tan, rows[rows.len() - 1].tan);
         let cells = 2 * rows.len();
@@ -257,14 +267,14 @@ impl RowFinder {
 
     /// The first row for which `below` holds, which it does for all rows after the first; that is about where the tangent of
     /// elevation falls to `tan`.
-    #[inline]
+    #[inline(always)]
     fn first(&self, rows: &[Row], tan: f32, below: impl Fn(&Row) -> bool) -> usize {
         let cell = ((self.top - tan) * self.per_tan).clamp(0.0, (self.table.len() - 1) as f32);
         first_beside(rows, self.table[cell as usize] as usize, below)
     }
 
     /// The rows whose rays come farther than `near` before they meet floor or ceiling.
-    #[inline]
+    #[inline(always)]
     fn before_planes(&self, frame: &Frame, near: f32) -> Range<usize> {
         let (rows, p) = (&frame.rows, &frame.params);
         let start = self.first(rows, (p.room_height - p.camera_height) / near, |r| r.tan < 0.0 || r.plane > near);
@@ -294,7 +304,7 @@ mod tests {
             let (room, mut ahead) = (room(&frame.rows), 0..0);
             let mut spans = [Spans::default(), Spans::default()];
             for near in [3.0, 0.01, 0.4, 900.0, 5.0, 5.1, 0.2, 2.0e8] {
-                let wall = Hit { near, far: near, surface: 2, ..Hit::NONE };
+                let wall = Hit { near, far: near, surface: 2, ..*Hit::NONE };
                 spans.iter_mut().for_each(|s| s.spans.clear());
                 spans[0].finder.prepare(&frame.rows);
                 spans[0].lay_out(&frame, &[wall], &room);

@@ -8,7 +8,7 @@ use crate::error::Result;
 use crate::panorama::{INSTANCE_CEILING, INSTANCE_FLOOR, Panorama, Projection};
 use crate::render::columns::MAX_HITS;
 use crate::render::frame::Row;
-use crate::render::now::{Now, Shown};
+use crate::render::now::{Now, Shown, Unit};
 
 /// Bytes that the shader writes for a pixel.
 pub(super) const PIXEL_BYTES: u64 = 4;
@@ -75,7 +75,7 @@ impl Unpacker {
 
 /// What a code of a column with such hits stands for.
 fn shown(code: u8, hits: &[SeenHit; MAX_HITS]) -> Shown {
-    let room = |instance| Shown { room: 1.0, instance, ..Shown::default() };
+    let room = |instance| Shown { distance: 1.0, unit: Unit::Plane, instance };
     match usize::from(code) {
         1 => room(INSTANCE_FLOOR),
         2 => room(INSTANCE_CEILING),
@@ -83,9 +83,9 @@ fn shown(code: u8, hits: &[SeenHit; MAX_HITS]) -> Shown {
             let hit = hits[(code - 3) / 2];
             let instance = hit.instance as u16;
             if code % 2 == 1 {
-                Shown { near: hit.near, instance, ..Shown::default() }
+                Shown { distance: hit.near, unit: Unit::Metre, instance }
             } else {
-                Shown { height: hit.height, instance, ..Shown::default() }
+                Shown { distance: hit.height, unit: Unit::InverseTan, instance }
             }
         }
         // Nothing is at no distance.
