@@ -421,7 +421,7 @@ fn lay_out<'a>(band: &Band<'a>, desk: &mut Desk, rows: usize, column: usize, fir
     }
 }
 
-/// Notes that rows of a column see a horizontal surface.
+/// Notes that rows of a column see a horizontal surface, where none was noted to see it before.
 #[inline(always)]
 fn note_level(band: &Band<'_>, desk: &mut Desk, surface: u32, face: Face, rows: Range<usize>, column: usize) {
     let all_rows = desk.first_change.len();

@@ -64,7 +64,7 @@ fn depth_at_wall(frame: &Frame, edge: &Edge, [x, y]: [f32; 2], normal: [f32; 2])
     if before > -BEHIND { depth } else { 0.0 }
 }
 
-/// Rows of a column that see the side of a wall or body.
+/// Rows of a column that see the side of a wall or body; or nothing, [`Hit::NONE`], and then they are not shaded.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Run<'a> {
     pub hit: &'a Hit,
@@ -179,7 +179,7 @@ impl Run<'_> {
     /// Light on the rows, of which the last block may be more.
     #[inline(always)]
     fn light(&self, frame: &Frame, light: &mut [[f32; LANES]]) {
-        let Self { hit, direction, first_row, count, .. } = *self;
+        let Self { hit, direction, first_row, count } = *self;
         let eye = frame.params.camera_height;
         let rows = &frame.rows[first_row..first_row + count];
         light.fill([frame.params.ambient; LANES]);
