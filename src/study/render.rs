@@ -152,14 +152,16 @@ pub fn measure(effort: Effort, tell: &mut dyn FnMut(&Speed) -> Result<()>) -> Re
             Ok(())
         };
         for set in InstructionSet::ALL.into_iter().filter(|set| set.is_available()) {
-            keep(bench.time(&format!("CPU, {set}"), &mut CpuRenderer::on(set)?, Way::One)?)?;
+            let [speed] = bench.time(&format!("CPU, {set}"), &mut CpuRenderer::on(set)?, [Way::One])?;
+            keep(speed)?;
         }
-        for threads in [1, 2] {
-            let what = format!("CPU, {}, batch", InstructionSet::best());
-            keep(bench.time(&what, &mut CpuRenderer::new(), Way::Batch(threads))?)?;
+        let what = format!("CPU, {}, batch", InstructionSet::best());
+        for speed in bench.time(&what, &mut CpuRenderer::new(), [Way::Batch(1), Way::Batch(2)])? {
+            keep(speed)?;
         }
         if let Some(gpu) = &mut gpu {
-            keep(bench.time("GPU", gpu, Way::Batch(1))?)?;
+            let [speed] = bench.time("GPU", gpu, [Way::Batch(1)])?;
+            keep(speed)?;
         }
     }
     let bodies_size = SIZES[1];
@@ -168,7 +170,7 @@ pub fn measure(effort: Effort, tell: &mut dyn FnMut(&Speed) -> Result<()>) -> Re
         let world = hall(count)?;
         let scene = Scene::new(&world)?;
         let mut bench = Bench { scene: &scene, world: &world, size: bodies_size, effort, limit: &mut limit };
-        let speed = bench.time("", &mut CpuRenderer::new(), Way::One)?;
+        let [speed] = bench.time("", &mut CpuRenderer::new(), [Way::One])?;
         bodies.push(Cost { bodies: count, panorama_s: 1.0 / speed.panoramas_per_s });
     }
     let (cpu, gpu) = (CpuRenderer::new().info().clone(), gpu.map(|g| g.info().clone()));
@@ -211,6 +213,33 @@ enum Way {
     Batch(usize),
 }
 
+/// One way of asking, and what was timed of it.
+struct Lane {
+    way: Way,
+    threads: usize,
+    pool: rayon::ThreadPool,
+    /// Pictures of a run.
+    length: usize,
+    /// Where [`Way::One`] renders to.
+    out: Panorama,
+    /// Panoramas a second, run by run.
+    rates: Vec<f64>,
+    /// Bytes a second that can be filled, before and after each run.
+    fills: Vec<f64>,
+}
+
+impl Lane {
+    fn new(way: Way) -> Result<Self> {
+        let threads = match way {
+            Way::One => 1,
+            Way::Batch(threads) => threads,
+        };
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+        let pool = pool.map_err(|error| Error::Threads(error.to_string()))?;
+        Ok(Self { way, threads, pool, length: 4, out: Panorama::empty(), rates: Vec::new(), fills: Vec::new() })
+    }
+}
+
 /// A place to time renderers in.
 struct Bench<'a> {
     scene: &'a Scene,
@@ -221,55 +250,64 @@ struct Bench<'a> {
 }
 
 impl Bench<'_> {
-    /// Times a renderer.
-    fn time(&mut self, what: &str, renderer: &mut dyn Renderer, way: Way) -> Result<Speed> {
-        let threads = match way {
-            Way::One => 1,
-            Way::Batch(threads) => threads,
-        };
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-        let pool = pool.map_err(|error| Error::Threads(error.to_string()))?;
-        let (width, height) = self.size;
-        let projection = self.world.projection_of_size(width, height);
-        let bodies = self.world.body_poses();
-        // A batch long enough that its ends do not count, nor the pages that it asks the system for, nor caches that were emptied by
-        // filling memory.
-        let mut length = 4;
-        let mut out = Panorama::empty();
-        let (mut rates, mut fills) = (Vec::new(), vec![self.limit.time()]);
-        let began = Instant::now();
-        while rates.len() < 5 || began.elapsed().as_secs_f64() < self.effort.seconds {
-            let views = views(projection, &bodies, length, rates.len());
-            let started = Instant::now();
-            pool.install(|| match way {
-                Way::One => views.iter().try_for_each(|view| {
-                    renderer.render(self.scene, view, &mut out)?;
-                    black_box(&out);
-                    Ok(())
-                }),
-                Way::Batch(_) => renderer.render_batch(self.scene, &views, &mut look),
-            })?;
-            let elapsed = started.elapsed().as_secs_f64();
-            if elapsed < 0.2 * self.effort.seconds {
-                length *= 2; // still finding out
-                continue;
+    /// Times a renderer, each way in turn.
+    fn time<const N: usize>(&mut self, what: &str, renderer: &mut dyn Renderer, ways: [Way; N]) -> Result<[Speed; N]> {
+        let mut lanes = Vec::new();
+        for way in ways {
+            let mut lane = Lane::new(way)?;
+            // So many pictures that the ends of a run do not count, nor the pages that it asks the system for, nor caches that were
+            // emptied by filling memory.
+            while self.run(renderer, &mut lane)? < 0.2 * self.effort.seconds {
+                lane.length *= 2;
             }
-            rates.push(length as f64 / elapsed);
-            fills.push(self.limit.time());
+            lanes.push(lane);
         }
+        let began = Instant::now();
+        let mut fill = self.limit.time();
+        while lanes[0].rates.len() < 5 || began.elapsed().as_secs_f64() < N as f64 * self.effort.seconds {
+            for lane in &mut lanes {
+                let elapsed = self.run(renderer, lane)?;
+                lane.rates.push(lane.length as f64 / elapsed);
+                lane.fills.push(fill);
+                fill = self.limit.time();
+                lane.fills.push(fill);
+            }
+        }
+        let (width, height) = self.size;
         let median = |values: &[f64]| quantile(values, 0.5).unwrap_or(f64::NAN);
-        let (rate, fill_bytes_per_s) = (median(&rates), median(&fills));
-        let colour_bytes_per_s = 4.0 * projection.pixels() as f64 * rate;
-        Ok(Speed {
-            what: what.to_owned(),
-            width,
-            height,
-            threads,
-            panoramas_per_s: rate,
-            colour_bytes_per_s,
-            fill_bytes_per_s,
-            share: colour_bytes_per_s / fill_bytes_per_s,
-        })
+        Ok(std::array::from_fn(|k| {
+            let lane = &lanes[k];
+            let (panoramas_per_s, fill_bytes_per_s) = (median(&lane.rates), median(&lane.fills));
+            let colour_bytes_per_s = 4.0 * f64::from(width) * f64::from(height) * panoramas_per_s;
+            Speed {
+                what: what.to_owned(),
+                width,
+                height,
+                threads: lane.threads,
+                panoramas_per_s,
+                colour_bytes_per_s,
+                fill_bytes_per_s,
+                share: colour_bytes_per_s / fill_bytes_per_s,
+            }
+        }))
+    }
+
+    /// Seconds that a run takes.
+    fn run(&self, renderer: &mut dyn Renderer, lane: &mut Lane) -> Result<f64> {
+        let (width, height) = self.size;
+        let bodies = self.world.body_poses();
+        let views = views(self.world.projection_of_size(width, height), &bodies, lane.length, lane.rates.len());
+        let (way, out) = (lane.way, &mut lane.out);
+        let started = Instant::now();
+        lane.pool.install(|| match way {
+            Way::One => views.iter().try_for_each(|view| {
+                renderer.render(self.scene, view, out)?;
+                black_box(&*out);
+                Ok(())
+            }),
+            Way::Batch(_) => renderer.render_batch(self.scene, &views, &mut look),
+        })?;
+        Ok(started.elapsed().as_secs_f64())
     }
 }
 
@@ -303,7 +341,8 @@ mod tests {
         let mut limit = Limit { bytes: vec![1; 1 << 16] };
         let effort = Effort { seconds: 0.02 };
         let mut bench = Bench { scene: &scene, world: &world, size: (64, 8), effort, limit: &mut limit };
-        let speed = bench.time("CPU", &mut CpuRenderer::new(), Way::Batch(2)).unwrap();
-        assert!(speed.panoramas_per_s > 0.0 && speed.share > 0.0, "{speed:?}");
+        let speeds = bench.time("CPU", &mut CpuRenderer::new(), [Way::One, Way::Batch(2)]).unwrap();
+        assert_eq!(speeds.each_ref().map(|s| s.threads), [1, 2]);
+        assert!(speeds.iter().all(|s| s.panoramas_per_s > 0.0 && s.share > 0.0), "{speeds:?}");
     }
 }
