@@ -61,8 +61,8 @@ impl Film {
 fn a_batch_is_the_same_pictures_one_by_one() {
     Film::new(101, 96, 13).check(&mut CpuRenderer::new());
     let film = Film::new(7, 96, 13);
-    // In a pool of another size, and where a group is one picture.
-    for threads in [1, 3] {
+    // In pools of another size, and where threads share pictures.
+    for threads in [1, 3, 16] {
         rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap().install(|| film.check(&mut CpuRenderer::new()));
     }
     film.check_sizes();

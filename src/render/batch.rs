@@ -15,10 +15,15 @@ const GROUP_BYTES: usize = 4 << 20;
 /// Most pictures of a group for each thread: more would only let the first result wait longer.
 const MOST_PER_THREAD: usize = 16;
 
-/// Pictures of a group, when the largest of a batch has `pixels`: as many for each thread.
-fn group_length(pixels: usize) -> usize {
-    let threads = rayon::current_num_threads();
-    (GROUP_BYTES / (PIXEL_BYTES * pixels.max(1))).clamp(1, MOST_PER_THREAD) * threads
+/// Bytes of a group beyond which it has fewer pictures than threads, which then share each picture: on a machine of many
+/// threads the largest pictures would need more memory than it has.
+const MOST_BYTES: usize = 512 << 20;
+
+/// Pictures of a group for so many threads, when the largest of a batch has `pixels`.
+fn group_length(pixels: usize, threads: usize) -> usize {
+    let bytes = PIXEL_BYTES * pixels.max(1);
+    let each = (GROUP_BYTES / bytes).clamp(1, MOST_PER_THREAD);
+    (each * threads).min((MOST_BYTES / bytes).max(1))
 }
 
 /// The driver behind [`Renderer::render_batch`].
@@ -29,7 +34,7 @@ pub(super) fn run<R: Renderer + ?Sized>(
     sink: &mut (dyn FnMut(usize, &mut [Panorama]) -> Result<()> + Send),
 ) -> Result<()> {
     let pixels = views.iter().map(|v| v.projection.pixels()).max().unwrap_or(0);
-    let length = group_length(pixels);
+    let length = group_length(pixels, rayon::current_num_threads());
     let mut groups = views.chunks(length);
     let Some(first) = groups.next() else { return Ok(()) };
     let empty = |count| vec![Panorama::empty(); count];
@@ -45,4 +50,21 @@ pub(super) fn run<R: Renderer + ?Sized>(
         (start, count) = (start + count, group.len());
     }
     sink(start, &mut shown[..count])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn groups_are_bounded_in_pictures_and_in_bytes() {
+        assert_eq!(group_length(64 * 8, 2), 32);
+        assert_eq!(group_length(1440 * 180, 2), 2);
+        assert_eq!(group_length(4680 * 480, 16), 16);
+        for threads in [1, 16, 256] {
+            assert_eq!(group_length(16_384 * 4096, threads), 1);
+            let pixels = 8192 * 1024;
+            assert!((1..=6).contains(&group_length(pixels, threads)));
+        }
+    }
 }

@@ -102,10 +102,9 @@ impl Renderer for CpuRenderer {
 
     fn render_group(&mut self, scene: &Scene, views: &[View<'_>], out: &mut [Panorama]) -> Result<()> {
         assert_eq!(views.len(), out.len(), "a place for each view");
-        if let ([view], [out]) = (views, &mut *out) {
-            return self.render(scene, view, out);
-        }
-        views.par_iter().zip(out).with_max_len(1).try_for_each(|(view, out)| self.paint(scene, view, out, false))
+        // Where threads would be left without a picture they share those there are.
+        let share = views.len() < rayon::current_num_threads();
+        views.par_iter().zip(out).with_max_len(1).try_for_each(|(view, out)| self.paint(scene, view, out, share))
     }
 
     fn info(&self) -> &RendererInfo {

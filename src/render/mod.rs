@@ -86,8 +86,9 @@ pub trait Renderer: Send {
     /// fails, or the size is more than it allows.
     fn render(&mut self, scene: &Scene, view: &View<'_>, out: &mut Panorama) -> Result<()>;
 
-    /// Renders several views at once, each into the place of `out` with its number: on the CPU a thread takes a picture, on a GPU
-    /// several pictures are under way. All of them are in memory together; [`Renderer::render_batch`] is for many.
+    /// Renders several views at once, each into the place of `out` with its number: on the CPU a thread takes a picture, or threads
+    /// share it where there are fewer pictures than threads; on a GPU several pictures are under way. All of them are in memory
+    /// together; [`Renderer::render_batch`] is for many.
     ///
     /// # Errors
     /// As [`Renderer::render`]; then nothing is known of what `out` holds.
@@ -100,9 +101,9 @@ pub trait Renderer: Send {
     /// do with them as it likes, for instance develop them by a camera.
     ///
     /// While `sink` works on one group of pictures the next one is rendered. At most two groups are in memory, whatever the length
-    /// of the batch: together two to 32 pictures for each thread of the pool, the fewer the larger they are. A graphics adapter holds
-    /// three more, twice each on hardware. Each view has its own poses of robot and bodies, so that a batch may be a film of
-    /// moving bodies.
+    /// of the batch: together two to 32 pictures for each thread of the pool, the fewer the larger they are; of pictures so large
+    /// that these would take more than 1 GiB, fewer, but two. A graphics adapter holds three more, twice each on hardware. Each
+    /// view has its own poses of robot and bodies, so that a batch may be a film of moving bodies.
     ///
     /// ```
     /// use wayhome::geometry::Pose;
