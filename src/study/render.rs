@@ -252,21 +252,18 @@ struct Bench<'a> {
 impl Bench<'_> {
     /// Times a renderer, each way in turn.
     fn time<const N: usize>(&mut self, what: &str, renderer: &mut dyn Renderer, ways: [Way; N]) -> Result<[Speed; N]> {
-        let mut lanes = Vec::new();
-        for way in ways {
-            let mut lane = Lane::new(way)?;
-            // So many pictures that the ends of a run do not count, nor the pages that it asks the system for, nor caches that were
-            // emptied by filling memory.
-            while self.run(renderer, &mut lane)? < 0.2 * self.effort.seconds {
-                lane.length *= 2;
-            }
-            lanes.push(lane);
-        }
+        let mut lanes = ways.into_iter().map(Lane::new).collect::<Result<Vec<_>>>()?;
         let began = Instant::now();
         let mut fill = self.limit.time();
-        while lanes[0].rates.len() < 5 || began.elapsed().as_secs_f64() < N as f64 * self.effort.seconds {
+        while lanes.iter().any(|lane| lane.rates.len() < 5) || began.elapsed().as_secs_f64() < N as f64 * self.effort.seconds {
             for lane in &mut lanes {
                 let elapsed = self.run(renderer, lane)?;
+                // A run is so long that its ends do not count, nor the pages that it asks the system for, nor caches that were emptied
+                // by filling memory.
+                if elapsed < 0.2 * self.effort.seconds {
+                    lane.length *= 2;
+                    continue;
+                }
                 lane.rates.push(lane.length as f64 / elapsed);
                 lane.fills.push(fill);
                 fill = self.limit.time();
