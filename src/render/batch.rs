@@ -1,4 +1,4 @@
-//! Many pictures in order, with bounded memory.
+//! Many pictures in order, with bounded memory, from a renderer that makes several at once.
 //!
 //! Pictures are rendered in groups. While one group is shown to the caller the next one is rendered, so that at most two groups
 //! are in memory, whatever the length of the batch. Their buffers are reused from group to group.
@@ -9,18 +9,18 @@ use crate::panorama::Panorama;
 
 /// Bytes of a pixel of a [`Panorama`]: colour, range and instance.
 const PIXEL_BYTES: usize = 10;
-/// Bytes of a group for each thread, where the pictures are so small that more than one fits: enough of them that no thread waits
-/// long at the end of a group, and no more than stay near the processor: with four times as many, 1440 x 180 took a third longer.
+/// Bytes of a group for each thread, where the pictures are so small that more than one fits: enough of them that threads can
+/// share in showing them, and no more than stay near the processor: with four times as many, 1440 x 180 took a third longer.
 const GROUP_BYTES: usize = 4 << 20;
 /// Most pictures of a group for each thread: more would only let the first result wait longer.
 const MOST_PER_THREAD: usize = 16;
-
 /// Bytes of a group beyond which it has fewer pictures than threads, which then share each picture: on a machine of many
 /// threads the largest pictures would need more memory than it has.
 const MOST_BYTES: usize = 512 << 20;
 
-/// Pictures of a group for so many threads, when the largest of a batch has `pixels`.
-fn group_length(pixels: usize, threads: usize) -> usize {
+/// Pictures of a group for so many threads, when the largest of a batch has `pixels`: the most that are shown at once. Twice as
+/// many are in memory.
+pub(super) fn group_length(pixels: usize, threads: usize) -> usize {
     let bytes = PIXEL_BYTES * pixels.max(1);
     let each = (GROUP_BYTES / bytes).clamp(1, MOST_PER_THREAD);
     (each * threads).min((MOST_BYTES / bytes).max(1))

@@ -19,7 +19,7 @@ use super::sample::{LANES, POINTS, PointRoom, RUN, StripRoom};
 use super::shade::{Light, Plane, PlaneRow, Run, Sides};
 use super::spans::{NOTHING, Spans};
 use super::texels::{Gathered, LookUp, OneByOne};
-use super::{InstructionSet, Renderer, RendererInfo, Scene, View};
+use super::{InstructionSet, Renderer, RendererInfo, Scene, View, stream};
 use crate::error::Result;
 use crate::panorama::Panorama;
 
@@ -105,6 +105,15 @@ impl Renderer for CpuRenderer {
         // Where threads would be left without a picture they share those there are.
         let share = views.len() < rayon::current_num_threads();
         views.par_iter().zip(out).with_max_len(1).try_for_each(|(view, out)| self.paint(scene, view, out, share))
+    }
+
+    fn render_batch(
+        &mut self,
+        scene: &Scene,
+        views: &[View<'_>],
+        sink: &mut (dyn FnMut(usize, &mut [Panorama]) -> Result<()> + Send),
+    ) -> Result<()> {
+        stream::run(views, |view, out, share| self.paint(scene, view, out, share), sink)
     }
 
     fn info(&self) -> &RendererInfo {

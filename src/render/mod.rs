@@ -31,6 +31,7 @@ mod sample;
 mod scene;
 mod shade;
 mod spans;
+mod stream;
 mod texels;
 mod texture;
 
@@ -100,10 +101,10 @@ pub trait Renderer: Send {
     /// Renders many views and shows them to `sink` in their order, some at a time, with the number of the first of them. It may
     /// do with them as it likes, for instance develop them by a camera.
     ///
-    /// While `sink` works on one group of pictures the next one is rendered. At most two groups are in memory, whatever the length
-    /// of the batch: together two to 32 pictures for each thread of the pool, the fewer the larger they are; of pictures so large
-    /// that these would take more than 1 GiB, fewer, but two. A graphics adapter holds three more, twice each on hardware. Each
-    /// view has its own poses of robot and bodies, so that a batch may be a film of moving bodies.
+    /// While `sink` works on some pictures the next ones are rendered. [`most_in_memory`] pictures are in memory at most, whatever
+    /// the length of the batch, and half of them are shown at once at most: the slower `sink` is, the more. A graphics adapter
+    /// holds three more, twice each on hardware. Each view has its own poses of robot and bodies, so that a batch may be a film
+    /// of moving bodies.
     ///
     /// ```
     /// use wayhome::geometry::Pose;
@@ -125,7 +126,7 @@ pub trait Renderer: Send {
     /// ```
     ///
     /// # Errors
-    /// The first of `sink` or of a picture; those before it have been shown, but for the group in which it happened.
+    /// The first of `sink` or of a picture. Pictures before it have been shown, but on a GPU for some that were under way with it.
     fn render_batch(
         &mut self,
         scene: &Scene,
@@ -137,6 +138,13 @@ pub trait Renderer: Send {
 
     /// What this renderer is.
     fn info(&self) -> &RendererInfo;
+}
+
+/// Most pictures of a size that a batch has in memory, in the thread pool at hand: two to 32 for each thread, the fewer the larger
+/// they are; and of pictures so large that these would take more than 1 GiB, fewer, but two.
+#[must_use]
+pub fn most_in_memory(projection: Projection) -> usize {
+    2 * batch::group_length(projection.pixels(), rayon::current_num_threads())
 }
 
 /// The renderer of a person's choice.

@@ -49,8 +49,7 @@ struct Output<'a> {
 pub fn run(args: &RenderArgs, context: &Context, world: &World, path: &Path) -> Result<Verdict> {
     let frames = checked(world, path)?;
     let projection = projection(args, world);
-    // Two groups of the batch; of one of them the files are being made.
-    let take = Take::new(args, world, projection, 2 * rayon::current_num_threads().min(frames.len()))?;
+    let take = Take::new(args, world, projection, render::most_in_memory(projection).min(frames.len()))?;
     let out = args.out.clone().unwrap_or_else(|| default_folder(&["render", &world.spec.name, "trajectory"]));
     let mut folder = OutputFolder::open(&out, "render --trajectory", FILES)?;
     let mut renderer = render::create(args.renderer)?;

@@ -1,11 +1,11 @@
 //! From a plan to files: render, take, encode and write, all at the same time.
 //!
-//! Pictures are rendered in groups ([`Renderer::render_batch`]). While one group is rendered, the one before it goes through the
-//! camera, its truth is found and its files are encoded and hashed, each picture on one thread of the pool; a thread of its own
-//! writes files that are done, in the frames' order. What is in memory at once does not grow with the set: two groups of
-//! panoramas (together 2 to 32 a thread, the fewer the larger they are), the encoded files of one group, at most 32
-//! frames or some 64 MiB that wait to be written, the truth of one part, and the scene and home panorama of one condition. Only the
-//! plan's poses grow with the set, some 50 bytes each.
+//! While pictures are rendered ([`Renderer::render_batch`]), those that are there go through the camera, their truth is found and
+//! their files are encoded and hashed, each picture on one thread of the pool; a thread of its own writes files that are done,
+//! in the frames' order. What is in memory at once does not grow with the set: the panoramas of a batch
+//! ([`crate::render::most_in_memory`]), the encoded files of half of them, at most 32 frames or some 64 MiB that wait to be
+//! written, the truth of one part, and the scene and home panorama of one condition. Only the plan's poses grow with the set,
+//! some 50 bytes each.
 
 use std::io::Write;
 use std::ops::ControlFlow;
