@@ -10,12 +10,12 @@ use crate::panorama::Panorama;
 /// Bytes of a pixel of a [`Panorama`]: colour, range and instance.
 const PIXEL_BYTES: usize = 10;
 /// Bytes of a group for each thread, where the pictures are so small that more than one fits: enough of them that threads can
-/// share in showing them, and no more than stay near the processor: with four times as many, 1440 x 180 took a third longer.
+/// share in showing them, and so little memory that it stays near the processor.
 const GROUP_BYTES: usize = 4 << 20;
 /// Most pictures of a group for each thread: more would only let the first result wait longer.
 const MOST_PER_THREAD: usize = 16;
-/// Bytes of a group beyond which it has fewer pictures than threads, which then share each picture: on a machine of many
-/// threads the largest pictures would need more memory than it has.
+/// Most bytes of a group, but for one picture. Threads share pictures where that leaves fewer of them than threads: on a machine of
+/// many threads, one each of the largest would need more memory than it has.
 const MOST_BYTES: usize = 512 << 20;
 
 /// Pictures of a group for so many threads, when the largest of a batch has `pixels`: the most that are shown at once. Twice as

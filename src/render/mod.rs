@@ -101,10 +101,10 @@ pub trait Renderer: Send {
     /// Renders many views and shows them to `sink` in their order, some at a time, with the number of the first of them. It may
     /// do with them as it likes, for instance develop them by a camera.
     ///
-    /// While `sink` works on some pictures the next ones are rendered. [`most_in_memory`] pictures are in memory at most, whatever
-    /// the length of the batch, and half of them are shown at once at most: the slower `sink` is, the more. A graphics adapter
-    /// holds three more, twice each on hardware. Each view has its own poses of robot and bodies, so that a batch may be a film
-    /// of moving bodies.
+    /// While `sink` works on some pictures other threads render the next ones. [`most_in_memory`] pictures are in memory at most,
+    /// whatever the length of the batch, and half of them are shown at once at most; on the CPU the more, the longer `sink` takes.
+    /// A graphics adapter holds three more, twice each on hardware. Each view has its own poses of robot and bodies, so that a
+    /// batch may be a film of moving bodies. `sink` may be called on any thread of the pool, never on two at a time.
     ///
     /// ```
     /// use wayhome::geometry::Pose;
@@ -126,7 +126,7 @@ pub trait Renderer: Send {
     /// ```
     ///
     /// # Errors
-    /// The first of `sink` or of a picture. Pictures before it have been shown, but on a GPU for some that were under way with it.
+    /// The first of `sink` or of a picture. Those before it have been shown, but on a GPU for the group in which it happened.
     fn render_batch(
         &mut self,
         scene: &Scene,
@@ -141,7 +141,8 @@ pub trait Renderer: Send {
 }
 
 /// Most pictures of a size that a batch has in memory, in the thread pool at hand: two to 32 for each thread, the fewer the larger
-/// they are; and of pictures so large that these would take more than 1 GiB, fewer, but two.
+/// they are; and of pictures so large that these would take more than 1 GiB, fewer, but at least
+/// two.
 #[must_use]
 pub fn most_in_memory(projection: Projection) -> usize {
     2 * batch::group_length(projection.pixels(), rayon::current_num_threads())

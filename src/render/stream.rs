@@ -5,6 +5,10 @@
 //! shown as memory is meant for. So a caller who is quick keeps no thread from its work, and one who is slow is shown many
 //! pictures at a time, which he may share among threads in turn. Buffers whose pictures were shown are taken up again, the last
 //! one first, while it is near the processor.
+//!
+//! Each picture is a task of the pool, so that a thread that waits for others within one, or within the caller's work, may take
+//! up another picture on top of it. It never comes to show pictures within showing some. Pictures that are painted by one
+//! thread each add one level; those that threads share, no more levels than there are pictures in memory.
 
 use std::collections::VecDeque;
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -85,9 +89,8 @@ where
         loop {
             let Some(mut turn) = self.state().turn(self.most_shown) else { return };
             let told = (turn.sink)(turn.first, &mut turn.pictures);
-            for _ in 0..self.state().end(turn, told, self.views.len()) {
-                scope.spawn(|scope| self.take(scope));
-            }
+            let more = self.state().end(turn, told, self.views.len());
+            (0..more).for_each(|_| scope.spawn(|scope| self.take(scope)));
         }
     }
 
@@ -141,6 +144,9 @@ impl<'a> State<'a> {
     fn end(&mut self, turn: Turn<'a>, told: Result<()>, all: usize) -> usize {
         self.sink = Some(turn.sink);
         self.ended = told.err();
+        if self.ended.is_some() {
+            return 0;
+        }
         let more = turn.pictures.len().min(all - self.tickets);
         self.spare.extend(turn.pictures);
         self.tickets += more;
@@ -199,7 +205,7 @@ mod tests {
         };
         in_pool(|| {
             run(&views(50), paint, &mut |first, pictures| {
-                // Twice as many as are shown at once, and those that are being shown.
+                // Twice as many as may be shown at once, those that are being shown among them.
                 assert!(painted.load(Ordering::SeqCst) <= first + 2 * THREADS);
                 assert_eq!(first, shown.len());
                 shown.extend(pictures.iter().map(|p| p.range_m[0] as usize));
@@ -211,26 +217,26 @@ mod tests {
     }
 
     #[test]
-    fn one_who_is_slow_is_shown_as_many_as_may_be() {
-        let painted = AtomicUsize::new(0);
-        let mut counts = Vec::new();
-        let paint = |view: &View<'_>, out: &mut Panorama, _: bool| {
-            number(view, out);
-            painted.fetch_add(1, Ordering::SeqCst);
-            Ok(())
-        };
-        in_pool(|| {
-            run(&views(50), paint, &mut |first, pictures| {
-                counts.push(pictures.len());
-                wait_for(&painted, (first + 2 * THREADS).min(50));
-                // Those counted last are ready a little later.
-                std::thread::sleep(Duration::from_millis(20));
-                Ok(())
-            })
-        })
-        .unwrap();
-        assert_eq!(counts.iter().sum::<usize>(), 50);
-        assert_eq!(counts[1..4], [THREADS; 3], "{counts:?}");
+    fn one_who_was_slow_is_shown_all_that_are_ready() {
+        let mut sink = |_: usize, _: &mut [Panorama]| Ok(());
+        let mut state = State::new(6, &mut sink);
+        let begun: Vec<_> = (0..6).map(|_| state.begin().unwrap()).collect();
+        let order = [1, 0, 4, 5, 2, 3];
+        let mut turns = Vec::new();
+        let mut under_way = None;
+        for number in order {
+            state.put(number, Ok(begun[number].1.clone()));
+            // From when 0 is ready the caller works on 0 and 1 until the last is done.
+            under_way = under_way.or_else(|| state.turn(3));
+            assert!(under_way.is_none() || state.turn(3).is_none(), "one thread at a time");
+        }
+        while let Some(turn) = under_way {
+            let (first, count) = (turn.first, turn.pictures.len());
+            turns.push((first, count, state.end(turn, Ok(()), 9)));
+            under_way = state.turn(3);
+        }
+        // First, how many, and how many are asked for in their place; of nine there are three left.
+        assert_eq!(turns, [(0, 2, 2), (2, 3, 1), (5, 1, 0)]);
     }
 
     #[test]

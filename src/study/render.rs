@@ -258,16 +258,17 @@ impl Bench<'_> {
         while lanes.iter().any(|lane| lane.rates.len() < 5) || began.elapsed().as_secs_f64() < N as f64 * self.effort.seconds {
             for lane in &mut lanes {
                 let elapsed = self.run(renderer, lane)?;
+                let before = std::mem::replace(&mut fill, self.limit.time());
                 // A run is so long that its ends do not count, nor the pages that it asks the system for, nor caches that were emptied
                 // by filling memory.
                 if elapsed < 0.2 * self.effort.seconds {
                     lane.length *= 2;
-                    continue;
+                    lane.rates.clear();
+                    lane.fills.clear();
+                } else {
+                    lane.rates.push(lane.length as f64 / elapsed);
+                    lane.fills.extend([before, fill]);
                 }
-                lane.rates.push(lane.length as f64 / elapsed);
-                lane.fills.push(fill);
-                fill = self.limit.time();
-                lane.fills.push(fill);
             }
         }
         let (width, height) = self.size;
