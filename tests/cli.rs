@@ -89,6 +89,7 @@ fn places_where_nothing_can_stand_are_refused() {
     assert_fails(&home("-5,3,0"), 2, &["start", "room"]);
     let render = |pose: &str| run(folder.path(), &["render", LAB, "--pose", pose]);
     assert_fails(&render("-1,3,0"), 2, &["--pose", "outside the room"]);
+    assert_fails(&render("0,3,0"), 2, &["--pose", "in a wall"]);
     let world: toml::Table = toml::from_str(&std::fs::read_to_string(LAB).unwrap()).unwrap();
     let pillar = world["landmarks"].as_array().unwrap().iter().find(|b| b["name"].as_str() == Some("pillar")).unwrap();
     let (x, y) = (&pillar["position_m"][0], &pillar["position_m"][1]);

@@ -11,8 +11,8 @@
 //! What is exact and what is not:
 //! - Walls, upright prisms over discs and convex polygons, their tops and undersides, floor and ceiling are met exactly, also
 //!   where bodies stand on one another, hang, or overlap. Behind fifteen bodies in a row a column sees no further body.
-//! - A ray that meets nothing, which takes a camera outside the room, is black with range 0 and instance 0. A camera inside the
-//!   solid of a body is an error.
+//! - A ray that meets nothing, which takes a camera outside the room, is black with range 0 and instance 0. A camera in the plane
+//!   of a wall looks past it. A camera inside the solid of a body is an error.
 //! - Textures are prefiltered, alike along both axes. Light is ambient and Lambert's, without shadows.
 //! - A camera's blur, noise and dirt change colours alone: range and instance ids stay exact.
 //! - The CPU renderer's pictures are the same bytes on every machine and any number of threads.

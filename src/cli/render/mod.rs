@@ -102,6 +102,9 @@ impl<'a> Meta<'a> {
     }
 }
 
+/// A camera nearer to a wall than this, m, may be in the wall's plane, and such a camera looks past it.
+const IN_WALL_M: f64 = 1e-9;
+
 /// The camera must be in the room and in no body; the robot's own size does not matter for a picture. `what` is what the error
 /// calls the pose.
 fn check_place(world: &World, pose: Pose, what: &str) -> Result<(), Error> {
@@ -113,6 +116,9 @@ fn check_place(world: &World, pose: Pose, what: &str) -> Result<(), Error> {
     };
     if !polygon::contains(&world.outline, camera) {
         return Err(refuse("outside the room".into()));
+    }
+    if polygon::distance_to_boundary(&world.outline, camera) < IN_WALL_M {
+        return Err(refuse("in a wall of the room".into()));
     }
     let height_m = world.spec.camera.height_m;
     let within = world.bodies.iter().filter(|b| b.bottom_m <= height_m && height_m <= b.top_m).find(|body| {
