@@ -87,8 +87,9 @@ fn page(findings: &Findings) -> String {
         ## Speed\n\n\
         A round hall of 40 textured walls with 20 discs, floor and ceiling; colours, range and instance of every pixel; prefiltered\n\
         textures, no noise. Four bytes of colour a pixel are counted, six of range and instance come on top. The limit is to fill\n\
-        256 MiB with one thread; it is timed again between any two of the runs whose median is shown. `wayhome render --bench`\n\
-        prints the table of the machine at hand.\n\n"
+        256 MiB with one thread by the system's memset; it is timed again between any two of the runs whose median is shown. On\n\
+        processors with large caches that is not all they can do: stores past the caches may be twice as fast.\n\
+        `wayhome render --bench` prints the table of the machine at hand.\n\n"
         .to_owned();
     let _ = writeln!(text, "Processor: {}.", findings.processor);
     if let Some(gpu) = &findings.gpu {
