@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use crate::world::WorldFault;
+use crate::fault::Fault;
 
 /// Result of a fallible library call.
 pub type Result<T> = std::result::Result<T, Error>;
@@ -35,7 +35,7 @@ pub enum Error {
         /// The file.
         path: PathBuf,
         /// Its faults.
-        faults: Vec<WorldFault>,
+        faults: Vec<Fault>,
     },
     /// A value from the command line or the library's caller is not allowed.
     #[error("{what}: found {found}, allowed is {allowed}")]
@@ -103,7 +103,7 @@ pub enum Error {
     Interrupted,
 }
 
-fn format_faults(path: &std::path::Path, faults: &[WorldFault]) -> String {
+fn format_faults(path: &std::path::Path, faults: &[Fault]) -> String {
     use std::fmt::Write;
     let mut text = format!("{}: {} fault{}", path.display(), faults.len(), if faults.len() == 1 { "" } else { "s" });
     for f in faults {

@@ -55,9 +55,11 @@
 //!
 //! # Floors
 //!
-//! Each module imports only what lies below it. From the top: the command line; `report`; `study`; `episode`; then side by
-//! side and blind to one another `physics`, `render`, `vision`, `estimation` and `control`; then `world`, `panorama` and
-//! `observation`; at the bottom [`geometry`], [`ode`], [`random`] streams, [`table`]s, [`storage`] and [`error`]s.
+//! Each module imports only what lies below it. From the top: the command line; [`report`]; [`study`] and [`verify`]; [`record`];
+//! [`episode`]; then side by side [`sensor`], [`method`] and [`dataset`]; then, blind to one another, [`physics`], [`render`],
+//! [`vision`], [`estimation`] and [`control`], with [`draw`] beside them; then [`world`], [`panorama_set`] and [`observation`]; at
+//! the bottom [`panorama`], [`document`]s, [`fault`]s, [`geometry`], [`ode`], [`random`] streams, [`table`]s, [`storage`] and
+//! [`error`]s.
 //!
 //! # Units and randomness
 //!
@@ -65,21 +67,29 @@
 //! the CPU renderer on any machine. That is why trigonometry goes through [`geometry`] and never through the platform.
 
 pub mod control;
+pub mod dataset;
+pub mod document;
+pub mod draw;
 pub mod episode;
 pub mod error;
 pub mod estimation;
+pub mod fault;
 pub mod geometry;
+pub mod method;
 pub mod observation;
 pub mod ode;
 pub mod panorama;
 pub mod panorama_set;
 pub mod physics;
 pub mod random;
+pub mod record;
 pub mod render;
 pub mod report;
+pub mod sensor;
 pub mod storage;
 pub mod study;
 pub mod table;
+pub mod verify;
 pub mod vision;
 pub mod world;
 

@@ -9,18 +9,18 @@ use std::process::{Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
 use wayhome::Error;
-use wayhome::episode::method::MethodKind;
-use wayhome::episode::sensor::DatasetChoice;
+use wayhome::dataset::check::{FaultKind, check};
+use wayhome::dataset::conditions::Condition;
+use wayhome::dataset::pipeline::{Job, Outcome};
+use wayhome::dataset::plan::{Headings, Places, Plan, Request};
 use wayhome::episode::{Bearings, Bench, PlantKind, Setup, Start};
 use wayhome::geometry::{Pose, wrap};
+use wayhome::method::MethodKind;
 use wayhome::panorama::Panorama;
 use wayhome::panorama_set::{Layout, PanoramaSet, Place};
 use wayhome::render::{CpuRenderer, Renderer, Scene, View};
 use wayhome::report::dataset::card;
-use wayhome::study::dataset::check::{FaultKind, check};
-use wayhome::study::dataset::conditions::Condition;
-use wayhome::study::dataset::pipeline::{Job, Outcome};
-use wayhome::study::dataset::plan::{Headings, Places, Plan, Request};
+use wayhome::sensor::DatasetChoice;
 use wayhome::table::{Cells, Table};
 use wayhome::world::World;
 

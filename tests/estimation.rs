@@ -7,13 +7,13 @@ use std::ops::ControlFlow;
 
 use num_dual::{Dual64, DualNum};
 use rayon::prelude::*;
-use wayhome::episode::method::{LawKind, MethodKind, build};
 use wayhome::episode::{Bearings, Bench, Outcome, Setup};
 use wayhome::estimation::anchored::map::predict_bearing;
 use wayhome::estimation::anchored::motion::SlipWatch;
 use wayhome::estimation::anchored::{AnchoredFilter, FilterSettings};
 use wayhome::estimation::paper;
 use wayhome::geometry::{Pose, Twist, Vector2, angle_of, wrap};
+use wayhome::method::{LawKind, MethodKind, build};
 use wayhome::observation::{
     Bearing, Briefing, Estimate, HomeSnapshot, LandmarkId, Observation, Odometry, RobotSheet, Status, TaskSheet,
 };

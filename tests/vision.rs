@@ -11,7 +11,7 @@ use wayhome::geometry::{Pose, direction, wrap};
 use wayhome::observation::Bearing;
 use wayhome::panorama::{Panorama, Projection};
 use wayhome::render::{self, RendererChoice, Scene, View};
-use wayhome::study::vision::score::{Score, Shot, Spread};
+use wayhome::verify::vision::score::{Score, Shot, Spread};
 use wayhome::vision::{Extractor, ExtractorSettings, Landmarks};
 use wayhome::world::World;
 

@@ -1,9 +1,10 @@
 //! World files: the built-in worlds, what validation finds, where a robot may start, and the map.
 
+use wayhome::draw::map::{MapDrawing, PathStyle, world_svg};
+use wayhome::fault::Fault;
 use wayhome::geometry::{Pose, Vector2};
 use wayhome::random::Seed;
-use wayhome::report::map::{MapDrawing, PathStyle, world_svg};
-use wayhome::world::{World, WorldFault, WorldSpec};
+use wayhome::world::{World, WorldSpec};
 use wayhome::{Error, Result};
 
 /// A small world without faults; each fault test spoils one thing in it.
@@ -66,7 +67,7 @@ named = [{ name = "A", x_m = 1.0, y_m = 1.0 }, { name = "B", x_m = 3.0, y_m = 2.
 speed_m_s = 0.3
 "#;
 
-fn faults(result: Result<World>) -> Vec<WorldFault> {
+fn faults(result: Result<World>) -> Vec<Fault> {
     match result {
         Err(Error::World { faults, .. }) => faults,
         other => panic!("expected a faulty world, got {other:?}"),

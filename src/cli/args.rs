@@ -5,13 +5,13 @@ use std::path::PathBuf;
 
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Parser, Subcommand};
-use wayhome::episode::method::{LawKind, MethodKind};
 use wayhome::episode::{Bearings, Look, PlantKind, Start};
 use wayhome::geometry::Pose;
+use wayhome::method::{LawKind, MethodKind};
 use wayhome::render::RendererChoice;
 use wayhome::report::paper::Target;
 use wayhome::study::robustness::Axis;
-use wayhome::study::vision::conditions::Axis as VisionAxis;
+use wayhome::verify::vision::conditions::Axis as VisionAxis;
 use wayhome::vision::Landmarks;
 use wayhome::world::{CameraPreset, LightPreset};
 

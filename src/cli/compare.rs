@@ -5,10 +5,11 @@ use std::path::PathBuf;
 
 use anyhow::Result;
 use serde::Serialize;
-use wayhome::episode::method::exec::ExecCommand;
 use wayhome::episode::{Bearings, PlantKind, Setup};
+use wayhome::method::exec::ExecCommand;
 use wayhome::render::RendererChoice;
-use wayhome::report::{OutputFolder, compare as report};
+use wayhome::report::compare as report;
+use wayhome::storage::OutputFolder;
 use wayhome::study::compare::{Comparison, Contender, compare, pick, runs};
 use wayhome::world::World;
 

@@ -38,7 +38,7 @@ impl Context {
         ctrlc::set_handler(move || {
             let insists = flag.swap(true, Ordering::Relaxed);
             // Nobody waits for a program under test any longer, and none stays behind.
-            wayhome::episode::method::exec::end_all();
+            wayhome::method::exec::end_all();
             if insists {
                 std::process::exit(INTERRUPTED);
             }
@@ -54,7 +54,7 @@ impl Context {
 
     /// Prints a result: as one JSON object where the user asked for it, else as text.
     pub fn print(&self, json: &impl Serialize, text: impl FnOnce() -> String) -> Result<()> {
-        let text = if self.json { wayhome::report::json(json) } else { text() };
+        let text = if self.json { wayhome::storage::json(json) } else { text() };
         print(&text)
     }
 

@@ -8,15 +8,16 @@ use std::sync::Mutex;
 
 use anyhow::{Result, bail};
 use serde::Serialize;
-use wayhome::episode::sensor::DatasetChoice;
+use wayhome::dataset::check::{Inspection, check};
+use wayhome::dataset::conditions::{CHANGES, Condition};
+use wayhome::dataset::pipeline::Job;
+use wayhome::dataset::plan::{Headings, Places, Plan, Request};
 use wayhome::panorama_set::{Layout, Place};
 use wayhome::render::{self, RendererChoice};
-use wayhome::report::{OutputFolder, dataset as report};
-use wayhome::study::dataset::check::{Inspection, check};
-use wayhome::study::dataset::conditions::{CHANGES, Condition};
-use wayhome::study::dataset::pipeline::Job;
-use wayhome::study::dataset::plan::{Headings, Places, Plan, Request};
-use wayhome::study::dataset::speed;
+use wayhome::report::dataset as report;
+use wayhome::sensor::DatasetChoice;
+use wayhome::storage::OutputFolder;
+use wayhome::verify::dataset as speed;
 use wayhome::world::World;
 
 use super::Verdict;
@@ -377,7 +378,7 @@ fn bench(world: &str, frames: usize, out: Option<&Path>, context: &Context) -> R
     bar.finish_and_clear();
     if let Some(mut folder) = folder {
         folder.write("README.md", report::speed_page(&found).as_bytes())?;
-        folder.write("speed.json", wayhome::report::json(&found).as_bytes())?;
+        folder.write("speed.json", wayhome::storage::json(&found).as_bytes())?;
         folder.finish()?;
     }
     context.print(&found, || report::speed_text(&found))?;

@@ -7,8 +7,9 @@ use serde::Serialize;
 use wayhome::episode::Setup;
 use wayhome::episode::open_loop::{Commands, DriveSummary, drive};
 use wayhome::random::Seed;
-use wayhome::report::drive::{DriveFiles, FILES};
-use wayhome::report::{OutputFolder, text};
+use wayhome::record::drive::{DriveFiles, FILES};
+use wayhome::report::text;
+use wayhome::storage::OutputFolder;
 use wayhome::world::World;
 
 use super::Verdict;

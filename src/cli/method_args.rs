@@ -5,8 +5,8 @@ use std::time::Duration;
 
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::error::ErrorKind;
-use wayhome::episode::method::MethodKind;
-use wayhome::episode::method::exec::ExecCommand;
+use wayhome::method::MethodKind;
+use wayhome::method::exec::ExecCommand;
 
 use super::args::positive;
 

@@ -4,7 +4,8 @@ use std::path::PathBuf;
 
 use anyhow::Result;
 use serde::Serialize;
-use wayhome::report::{OutputFolder, paper::map_summary, paper::map_svg};
+use wayhome::report::paper::{map_summary, map_svg};
+use wayhome::storage::OutputFolder;
 use wayhome::study::observability::{Facing, ObservabilityMap, map};
 use wayhome::world::World;
 

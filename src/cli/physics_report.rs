@@ -2,8 +2,9 @@
 
 use anyhow::Result;
 use serde::Serialize;
-use wayhome::report::{OutputFolder, physics as physics_report};
-use wayhome::study::physics;
+use wayhome::storage::OutputFolder;
+use wayhome::verify::physics;
+use wayhome::verify::physics::page as physics_report;
 
 use super::Verdict;
 use super::args::PhysicsReportArgs;

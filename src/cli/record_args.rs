@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use wayhome::report::recording::RecordingPaths;
+use wayhome::record::RecordingPaths;
 
 /// Files that grow while a run goes on.
 #[derive(Debug, Clone, clap::Args)]

@@ -2,14 +2,15 @@
 
 use anyhow::Result;
 use serde::Serialize;
+use wayhome::dataset::film;
+use wayhome::draw::sheet::Sheet;
 use wayhome::geometry::Twist;
 use wayhome::panorama::Panorama;
 use wayhome::random::Seed;
 use wayhome::render::{Camera, CpuRenderer, Scene, View};
-use wayhome::report::sheet::Sheet;
-use wayhome::report::{OutputFolder, render as render_report};
-use wayhome::study::film;
-use wayhome::study::render::{Effort, Findings};
+use wayhome::storage::OutputFolder;
+use wayhome::verify::render::page as render_report;
+use wayhome::verify::render::{Effort, Findings};
 use wayhome::world::{CameraPreset, LightPreset, World};
 
 use super::Verdict;

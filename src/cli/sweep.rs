@@ -9,8 +9,9 @@ use std::time::Instant;
 use anyhow::Result;
 use serde::Serialize;
 use wayhome::Error;
-use wayhome::report::sweep::{self as page, Rate, StudyFolder};
+use wayhome::report::sweep as page;
 use wayhome::study::statistics::wilson_95;
+use wayhome::study::sweep::store::{Rate, StudyFolder};
 use wayhome::study::sweep::{Row, Study, catalogue, run as run_chunks};
 
 use super::Verdict;

@@ -6,12 +6,13 @@ use std::path::Path;
 use anyhow::Result;
 use serde::Serialize;
 use wayhome::Error;
+use wayhome::draw::image::{colours_png, instance_png, range_png};
 use wayhome::episode::PoseRecord;
 use wayhome::panorama::Projection;
-use wayhome::report::image::{colours_png, instance_png, range_png};
-use wayhome::report::{OutputFolder, vision as report, write_atomically};
-use wayhome::study::vision::conditions::Axis;
-use wayhome::study::vision::{Pair, VisionSettings, VisionStudy, cells, run as run_study};
+use wayhome::storage::{OutputFolder, write_atomically};
+use wayhome::verify::vision::conditions::Axis;
+use wayhome::verify::vision::page as report;
+use wayhome::verify::vision::{Pair, VisionSettings, VisionStudy, cells, run as run_study};
 use wayhome::vision::ExtractorSettings;
 use wayhome::world::World;
 
@@ -73,7 +74,7 @@ pub fn run(args: &VisionReportArgs, context: &Context) -> Result<Verdict> {
     })?;
     bar.finish_and_clear();
     if let Some(pairs) = &args.pairs {
-        write_atomically(&pairs.join("pairs.json"), wayhome::report::json(&records).as_bytes())?;
+        write_atomically(&pairs.join("pairs.json"), wayhome::storage::json(&records).as_bytes())?;
     }
     report::write(folder, &study, &command(args), outside.as_deref())?;
     let output = Output { study: &study, out: args.out.display().to_string() };

@@ -2,7 +2,8 @@
 
 use anyhow::Result;
 use serde::Serialize;
-use wayhome::report::{map, write_atomically};
+use wayhome::draw::map;
+use wayhome::storage::write_atomically;
 use wayhome::world::World;
 
 use super::Verdict;
@@ -32,7 +33,7 @@ pub fn run(args: &WorldArgs, context: &Context) -> Result<Verdict> {
                 None => print(&drawing)?,
             }
         }
-        WorldCommand::Schema => print(&wayhome::report::json(&World::json_schema()))?,
+        WorldCommand::Schema => print(&wayhome::storage::json(&World::json_schema()))?,
     }
     Ok(Verdict::Done)
 }

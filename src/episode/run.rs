@@ -5,12 +5,12 @@ use std::time::Instant;
 
 use super::record::{Outcome, Pictures, Record, Step, Timing};
 use super::recorder::{Moment, Recorder};
-use super::sensor::Sensor;
 use crate::error::{Error, Result};
 use crate::geometry::{Pose, Twist, wrap};
 use crate::observation::{Bearing, Estimate, Method, Observation, Odometry, Status};
 use crate::panorama::Panorama;
 use crate::physics::{Collision, Plant};
+use crate::sensor::Sensor;
 use crate::world::TaskSpec;
 
 /// Longest time given to the robot to coast to rest after the end, s.

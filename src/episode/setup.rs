@@ -5,22 +5,22 @@ use std::sync::Arc;
 
 use serde::Serialize;
 
-use super::method::{self, LawKind, MethodKind};
 use super::record::Record;
 use super::recorder::Recorder;
 use super::run::{Parts, Progress, run_recorded};
-use super::sensor::{
-    CompassSensor, DatasetChoice, DatasetField, DatasetSensor, Degradation, DegradedSensor, IdealSensor, Noise, NoisySensor,
-    RenderedSensor, Sensor, Sight,
-};
 use crate::error::{Error, Result};
 use crate::estimation::anchored::FilterSettings;
 use crate::geometry::Pose;
+use crate::method::{self, LawKind, MethodKind};
 use crate::observation::{Briefing, CameraSheet, RobotSheet, TaskSheet};
 use crate::panorama::{Panorama, Projection};
 use crate::physics::{Plant, RapierPlant, UnicyclePlant};
 use crate::random::Seed;
 use crate::render::{self, Renderer, RendererChoice, Scene};
+use crate::sensor::{
+    CompassSensor, DatasetChoice, DatasetField, DatasetSensor, Degradation, DegradedSensor, IdealSensor, Noise, NoisySensor,
+    RenderedSensor, Sensor, Sight,
+};
 use crate::vision::ExtractorSettings;
 use crate::world::{CameraPreset, LightPreset, OpticsSpec, TaskSpec, World};
 

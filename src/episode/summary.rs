@@ -3,10 +3,10 @@
 use nalgebra::{Cholesky, Vector3};
 use serde::Serialize;
 
-use super::method::{LawKind, MethodKind};
 use super::record::{Outcome, Record, Step, Timing};
 use super::setup::{Bearings, PlantKind, Setup};
 use crate::geometry::{Pose, angle_of, wrap};
+use crate::method::{LawKind, MethodKind};
 use crate::observation::Estimate;
 use crate::physics::Collision;
 use crate::render::RendererInfo;

@@ -5,12 +5,12 @@ use std::fmt::Write;
 use serde::Serialize;
 use svg::node::element::{Group, Line, Rectangle, Text};
 
-use super::OutputFolder;
-use super::map::MapDrawing;
+use crate::draw::map::MapDrawing;
 use crate::episode::Outcome;
-use crate::episode::method::{LawKind, MethodKind};
 use crate::error::Result;
 use crate::geometry::Vector2;
+use crate::method::{LawKind, MethodKind};
+use crate::storage::OutputFolder;
 use crate::study::compare::{Comparison, Contender, Standing};
 use crate::study::seeds::Spread;
 use crate::world::World;

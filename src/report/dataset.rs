@@ -2,12 +2,12 @@
 
 use std::fmt::Write;
 
-use super::sheet::Sheet;
+use crate::dataset::check::{FaultKind, Inspection};
+use crate::draw::sheet::Sheet;
 use crate::error::Result;
 use crate::panorama::Panorama;
 use crate::panorama_set::{Document, Layout};
-use crate::study::dataset::check::{FaultKind, Inspection};
-use crate::study::dataset::speed::Findings;
+use crate::verify::dataset::Findings;
 
 /// Names of the files of the page on speed.
 pub const FILES: &[&str] = &["README.md", "speed.json"];

@@ -6,8 +6,8 @@ use std::fmt::Write;
 
 use serde::Serialize;
 
-use super::OutputFolder;
 use crate::error::Result;
+use crate::storage::OutputFolder;
 use crate::study::robustness::{Axis, Cell, Robustness, WRONG_CLAIM_M};
 
 /// Names of all files of a study.

@@ -1,8 +1,8 @@
 //! The files of a batch of seeds.
 
-use super::{OutputFolder, json};
 use crate::episode::Summary;
 use crate::error::Result;
+use crate::storage::{OutputFolder, json};
 use crate::study::seeds::SeedsSummary;
 
 /// Names of all files of a batch; the last is there when a method broke.

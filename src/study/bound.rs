@@ -20,8 +20,6 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::statistics::chi_square_95;
-use crate::episode::method::{self, LawKind, MethodKind};
-use crate::episode::sensor::{IdealSensor, Noise, NoisySensor, Sensor};
 use crate::episode::{BeliefError, Parts, PlantKind, Setup, Start, run};
 use crate::error::{Error, Result};
 use crate::estimation::anchored::map::Prior;
@@ -29,9 +27,11 @@ use crate::estimation::anchored::motion::{Motion, SlipWatch};
 use crate::estimation::anchored::smoother::{Frame, Iterate, Sighting, Stretch};
 use crate::estimation::anchored::{AnchoredFilter, FilterSettings};
 use crate::geometry::{Matrix3, Pose, angle_of};
+use crate::method::{self, LawKind, MethodKind};
 use crate::observation::{Bearing, Estimate, HomeSnapshot, LandmarkId, Odometry};
 use crate::physics::UnicyclePlant;
 use crate::random::{Seed, Stream, standard_normal};
+use crate::sensor::{IdealSensor, Noise, NoisySensor, Sensor};
 use crate::world::World;
 
 /// Least noise of bearings, rad: what even the ideal sensor states.

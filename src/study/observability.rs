@@ -4,11 +4,11 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::paper::ideal::Run;
-use crate::episode::sensor::{IdealSensor, Sensor};
 use crate::error::{Error, Result};
 use crate::estimation::observability::{Observability, observability};
 use crate::geometry::{Pose, Vector2, angle_of, direction};
 use crate::random::Seed;
+use crate::sensor::{IdealSensor, Sensor};
 use crate::world::World;
 use crate::world::polygon::{bounds, contains};
 

@@ -9,9 +9,9 @@ use std::ops::{ControlFlow, RangeInclusive};
 use serde::Serialize;
 
 use super::seeds::{OutcomeCounts, SeedEvent, SeedsSummary, Spread, run_seeds};
-use crate::episode::sensor::Degradation;
 use crate::episode::{Setup, SetupRecord, Summary};
 use crate::error::{Error, Result};
+use crate::sensor::Degradation;
 use crate::world::World;
 
 /// A claim to be home farther from it than this is a wrong one, m.

@@ -5,9 +5,9 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 
 use super::World;
-use super::document::{Node, Value};
 use super::load::read;
 use super::spec::MotionSpec;
+use crate::document::{Node, Value};
 use crate::error::{Error, Result};
 
 /// A world as its file has it, whose fields can be set one by one.

@@ -5,7 +5,6 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 use sha2::{Digest, Sha256};
 
-use super::document::Node;
 use super::picture::{Gallery, Pictures};
 use super::polygon::{anticlockwise, signed_area};
 use super::robot::{RobotPreset, RobotSpec};
@@ -13,8 +12,10 @@ use super::spec::{BodySpec, CameraPreset, ShapeSpec, WindowSpec, WorldSpec};
 use super::structure::{self, Findings};
 use super::texture::Texture;
 use super::validate;
-use super::{Body, Footprint, Window, World, WorldFault, Zone};
+use super::{Body, Footprint, Window, World, Zone};
+use crate::document::Node;
 use crate::error::{Error, Result};
+use crate::fault::Fault;
 use crate::geometry::{Pose, Vector2};
 use crate::panorama::INSTANCE_FIRST_WALL;
 
@@ -267,7 +268,7 @@ fn pane(window: &WindowSpec, outline: &[[f64; 2]]) -> Vec<Vector2<f64>> {
 }
 
 /// Reads all images of a world; those that cannot be had are faults.
-fn load_pictures(spec: &WorldSpec, source: &Path) -> (Pictures, Vec<WorldFault>) {
+fn load_pictures(spec: &WorldSpec, source: &Path) -> (Pictures, Vec<Fault>) {
     let builtin = source.to_str().is_some_and(|s| s.starts_with(BUILTIN_SOURCE));
     let gallery = if builtin {
         Gallery::Builtin(&BUILTIN_IMAGES)
@@ -278,7 +279,7 @@ fn load_pictures(spec: &WorldSpec, source: &Path) -> (Pictures, Vec<WorldFault>)
     let mut faults = Vec::new();
     for (place, texture) in spec.textures() {
         if let Some(Err((found, allowed))) = texture.image.as_ref().map(|path| pictures.load(path, &gallery)) {
-            faults.push(WorldFault { place: format!("{place}.image"), found, allowed, owner: None, line: None });
+            faults.push(Fault { place: format!("{place}.image"), found, allowed, owner: None, line: None });
         }
     }
     (pictures, faults)

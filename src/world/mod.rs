@@ -1,13 +1,12 @@
 //! Worlds: rooms with landmarks, obstacles, floor, robot, camera and home, loaded from a file and checked as a whole.
 //!
 //! [`WorldSpec`] is the file as written, [`World`] the checked form: absolute corners, radians, instance ids. Loading reports
-//! every fault of a file at once; see [`WorldFault`]. It goes through three gates: the text becomes a tree that knows its
-//! lines (`document`), the tree is compared with the schema (`structure`), and the spec's values and places are checked
+//! every fault of a file at once; see [`Fault`](crate::fault::Fault). It goes through three gates: the text becomes a tree that knows its
+//! lines ([`document`](crate::document)), the tree is compared with the schema (`structure`), and the spec's values and places are checked
 //! (`validate`); the images that it shows are read on the way (`picture`). A [`World`] also tells where a robot may stand and start (`free`).
 
 mod camera;
 pub mod convex;
-pub(crate) mod document;
 mod draft;
 mod free;
 mod light;
@@ -31,34 +30,6 @@ pub use picture::Picture;
 pub use robot::RobotSpec;
 pub use spec::{MotionSpec, TaskSpec, TextureFamily, TextureSpec, WorldSpec};
 pub use texture::{Pattern, Texture};
-
-/// One fault of a world file.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct WorldFault {
-    /// Where in the file, as a path of fields: `landmarks[2].height_m`.
-    pub place: String,
-    /// What stands there.
-    pub found: String,
-    /// What is allowed.
-    pub allowed: String,
-    /// Name of the body, zone or start that the place belongs to.
-    pub owner: Option<String>,
-    /// Line of the place, from 1, where the file's format tells it.
-    pub line: Option<usize>,
-}
-
-impl std::fmt::Display for WorldFault {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        if let Some(line) = self.line {
-            write!(f, "line {line}: ")?;
-        }
-        write!(f, "{}", self.place)?;
-        if let Some(owner) = &self.owner {
-            write!(f, " (\"{owner}\")")?;
-        }
-        write!(f, ": found {}, allowed is {}", self.found, self.allowed)
-    }
-}
 
 /// A checked world.
 #[derive(Debug, Clone, PartialEq)]

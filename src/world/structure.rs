@@ -5,8 +5,8 @@
 
 use serde_json::{Map, Value as Json};
 
-use super::WorldFault;
-use super::document::{Node, Value};
+use crate::document::{Node, Value};
+use crate::fault::Fault;
 
 /// The keywords that [`check`] acts on; `format` and notes are read over.
 #[cfg(test)]
@@ -30,11 +30,11 @@ const KEYWORDS: &[&str] = &[
 #[derive(Debug, Default)]
 pub(super) struct Findings {
     /// Fields that the format does not have.
-    pub unknown: Vec<WorldFault>,
+    pub unknown: Vec<Fault>,
     /// Numbers that are not finite.
-    pub not_finite: Vec<WorldFault>,
+    pub not_finite: Vec<Fault>,
     /// Values of the wrong type, and missing ones: with them the tree cannot be turned into a spec.
-    pub unreadable: Vec<WorldFault>,
+    pub unreadable: Vec<Fault>,
 }
 
 /// Compares a file with the schema and removes unknown fields from it.
@@ -178,8 +178,8 @@ impl<'s> Walk<'s> {
     }
 }
 
-fn fault(place: &str, found: String, allowed: String) -> WorldFault {
-    WorldFault { place: place.to_owned(), found, allowed, owner: None, line: None }
+fn fault(place: &str, found: String, allowed: String) -> Fault {
+    Fault { place: place.to_owned(), found, allowed, owner: None, line: None }
 }
 
 /// The one key of a tagged choice's table.

@@ -18,7 +18,7 @@ use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use wayhome::geometry::Pose;
 use wayhome::panorama::{Panorama, Projection};
 use wayhome::render::{CpuRenderer, GpuRenderer, InstructionSet, Renderer, Scene, View};
-use wayhome::study::render::{BODIES, SIZES, hall};
+use wayhome::verify::render::{BODIES, SIZES, hall};
 use wayhome::world::World;
 
 /// Pictures of a batch.

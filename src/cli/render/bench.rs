@@ -2,8 +2,8 @@
 
 use anyhow::Result;
 use wayhome::Error;
-use wayhome::report::render as render_report;
-use wayhome::study::render::{Effort, Findings, measure};
+use wayhome::verify::render::page as render_report;
+use wayhome::verify::render::{Effort, Findings, measure};
 
 use crate::cli::Verdict;
 use crate::cli::context::Context;

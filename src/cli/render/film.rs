@@ -6,13 +6,13 @@ use anyhow::Result;
 use rayon::prelude::*;
 use serde::Serialize;
 use wayhome::Error;
+use wayhome::dataset::film::{Frame, load};
+use wayhome::draw::image::{colours_png, instance_png, range_png};
 use wayhome::episode::PoseRecord;
 use wayhome::panorama::Panorama;
 use wayhome::random::Seed;
 use wayhome::render::{self, Camera, View};
-use wayhome::report::OutputFolder;
-use wayhome::report::image::{colours_png, instance_png, range_png};
-use wayhome::study::film::{Frame, load};
+use wayhome::storage::OutputFolder;
 use wayhome::world::World;
 
 use super::{Meta, RenderArgs, Take, check_place, projection};
@@ -73,7 +73,7 @@ pub fn run(args: &RenderArgs, context: &Context, world: &World, path: &Path) -> 
     let record = |(number, f): (usize, &Frame)| FrameRecord { number, t_s: f.time_s, pose: f.robot.into() };
     let frames = frames.iter().enumerate().map(record).collect();
     let meta = FilmMeta { meta: Meta::new(args, world, &take, renderer.info()), frames };
-    folder.write("meta.json", wayhome::report::json(&meta).as_bytes())?;
+    folder.write("meta.json", wayhome::storage::json(&meta).as_bytes())?;
     folder.finish()?;
     let text = || {
         let info = renderer.info();

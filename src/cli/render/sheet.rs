@@ -4,13 +4,13 @@ use std::path::Path;
 
 use anyhow::Result;
 use serde::Serialize;
+use wayhome::dataset::film;
+use wayhome::draw::sheet::Sheet;
 use wayhome::geometry::{Pose, Twist};
 use wayhome::panorama::Panorama;
 use wayhome::random::Seed;
 use wayhome::render::{self, Camera, View};
-use wayhome::report::OutputFolder;
-use wayhome::report::sheet::Sheet;
-use wayhome::study::film;
+use wayhome::storage::OutputFolder;
 use wayhome::world::World;
 
 use super::{RenderArgs, Take, check_place};

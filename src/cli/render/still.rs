@@ -2,13 +2,13 @@
 
 use anyhow::Result;
 use serde::Serialize;
+use wayhome::draw::image::{colours_png, instance_png, range_png};
 use wayhome::episode::PoseRecord;
 use wayhome::geometry::{Pose, Twist};
 use wayhome::panorama::Panorama;
 use wayhome::random::Seed;
 use wayhome::render::{self, Camera, View};
-use wayhome::report::OutputFolder;
-use wayhome::report::image::{colours_png, instance_png, range_png};
+use wayhome::storage::OutputFolder;
 use wayhome::world::World;
 
 use super::{Meta, RenderArgs, Take, check_place, projection};
@@ -49,7 +49,7 @@ pub fn run(args: &RenderArgs, context: &Context, world: &World, pose: Pose) -> R
     folder.write("rgb.png", &colours_png(&panorama, "rgb.png")?)?;
     folder.write("range.png", &range_png(&panorama, "range.png")?)?;
     folder.write("instance.png", &instance_png(&panorama, "instance.png")?)?;
-    folder.write("meta.json", wayhome::report::json(&meta).as_bytes())?;
+    folder.write("meta.json", wayhome::storage::json(&meta).as_bytes())?;
     folder.finish()?;
     let text = || {
         let (p, info) = (take.projection, renderer.info());

@@ -6,7 +6,7 @@ use super::contest::{Order, range};
 use super::tables::start_error_name;
 use super::{Section, Target, short};
 use crate::control::Law;
-use crate::report::chart::{Axis, Chart, Mark, Stroke};
+use crate::draw::chart::{Axis, Chart, Mark, Stroke};
 use crate::study::observability::ObservabilityMap;
 use crate::study::paper::claims::{Both, Claims, ImageClaims, StartError, Tally};
 use crate::study::paper::contest::{Contest, Entrant};

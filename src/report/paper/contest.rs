@@ -6,7 +6,7 @@ use super::tables::{law_name, set_text};
 use super::{Section, Target};
 use crate::control::Law;
 use crate::control::vectors::VectorLaw;
-use crate::report::chart::{BarSeries, Bars};
+use crate::draw::chart::{BarSeries, Bars};
 use crate::study::paper::STARTS;
 use crate::study::paper::contest::{Contest, Entrant, Row, Source, Told};
 use crate::study::paper::images::{ImageCase, ImageSet};

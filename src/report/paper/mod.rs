@@ -11,8 +11,8 @@ mod tables;
 use std::fs;
 use std::io;
 
-use super::OutputFolder;
 use crate::error::{Error, Result};
+use crate::storage::OutputFolder;
 
 pub use audit::{Evidence, audit};
 pub use contest::contest;

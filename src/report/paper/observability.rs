@@ -4,10 +4,10 @@ use std::fmt::Write;
 
 use super::{Section, Target, short};
 use crate::control::Law;
+use crate::draw::chart::{Axis, Chart, Ramp, Stroke};
+use crate::draw::map::MapDrawing;
 use crate::error::Result;
 use crate::geometry::Vector2;
-use crate::report::chart::{Axis, Chart, Ramp, Stroke};
-use crate::report::map::MapDrawing;
 use crate::study::observability::{Case, DEGENERATE, Geometry, ObservabilityMap, along, cases, geometries, ranked};
 use crate::study::paper::ideal::{Ideal, Run};
 use crate::world::World;

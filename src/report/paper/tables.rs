@@ -4,10 +4,10 @@ use std::fmt::Write;
 
 use super::{Section, Target, short};
 use crate::control::Law;
+use crate::draw::image::colours_png;
+use crate::draw::map::{MapDrawing, PathStyle};
 use crate::error::Result;
 use crate::panorama::{Panorama, Projection};
-use crate::report::image::colours_png;
-use crate::report::map::{MapDrawing, PathStyle};
 use crate::study::paper::claims::{ImageClaims, StartError, Tally};
 use crate::study::paper::ideal::Run;
 use crate::study::paper::images::{ImageCase, ImageSet};

@@ -3,7 +3,7 @@
 use svg::node::element::{Circle, Group, Polyline};
 
 use super::heat::{WIDTH_PX, document};
-use crate::report::chart::{FAINT_INK, INK, SERIES, line, px, text};
+use crate::draw::chart::{FAINT_INK, INK, SERIES, line, px, text};
 use crate::study::sweep::tally::Scale;
 
 /// The plot, px: left, top, right, bottom.

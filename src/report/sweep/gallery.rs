@@ -4,10 +4,10 @@ use image::codecs::jpeg::JpegEncoder;
 use image::imageops::FilterType;
 use image::{DynamicImage, ImageBuffer, Rgb};
 
-use super::StudyFolder;
 use crate::error::Result;
 use crate::panorama::Panorama;
-use crate::report::path_plot::path_drawing;
+use crate::record::path_plot::path_drawing;
+use crate::study::sweep::store::StudyFolder;
 use crate::study::sweep::{Row, replay};
 
 /// Width of a panorama in the page, px.

@@ -3,7 +3,7 @@
 use svg::Document;
 use svg::node::element::{Group, Title};
 
-use crate::report::chart::{FAINT_INK, INK, line, px, rectangle, text};
+use crate::draw::chart::{FAINT_INK, INK, line, px, rectangle, text};
 use crate::study::sweep::tally::Scale;
 
 /// Width of a figure, px: that of a phone, where it is shown as it is; on a desk several stand side by side.

@@ -5,15 +5,13 @@ mod figures;
 mod gallery;
 mod heat;
 mod page;
-mod store;
 
 use std::ops::ControlFlow;
 use std::path::Path;
 
-pub use store::{Rate, StudyFolder};
-
 use crate::error::Result;
-use crate::report::OutputFolder;
+use crate::storage::OutputFolder;
+use crate::study::sweep::store::StudyFolder;
 use crate::study::sweep::tally;
 use figures::Sums;
 use page::Page;

@@ -2,9 +2,9 @@
 
 use std::fmt::Write;
 
-use super::Rate;
 use super::figures::{Figure, Section, Sums};
 use super::gallery::{Exhibit, data_uri};
+use crate::study::sweep::store::Rate;
 use crate::study::sweep::tally::{OTHERS, Tally};
 use crate::study::sweep::{Design, Row};
 

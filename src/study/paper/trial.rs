@@ -3,11 +3,11 @@
 use crate::control::Law;
 use crate::control::printed::PrintedLaw;
 use crate::control::vectors::{VectorLaw, align};
-use crate::episode::method::{self, LawKind, MethodKind};
 use crate::error::Result;
 use crate::estimation::anchored::FilterSettings;
 use crate::estimation::paper::{PaperEkf, PaperSettings};
 use crate::geometry::{Pose, Twist, angle_of, sin_cos, wrap};
+use crate::method::{self, LawKind, MethodKind};
 use crate::observation::{
     Bearing, Briefing, Decision, HomeSnapshot, LandmarkId, Method, Observation, Odometry, RobotSheet, Status, TaskSheet,
 };

@@ -11,6 +11,7 @@ pub mod rows;
 mod run;
 pub mod settings;
 mod spec;
+pub mod store;
 pub mod tally;
 mod value;
 

@@ -9,10 +9,10 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 
 use super::value::Value;
-use crate::episode::method::{LawKind, MethodKind};
 use crate::episode::{Bearings, PlantKind, Setup, Start};
 use crate::error::{Error, Result};
 use crate::estimation::anchored::FilterSettings;
+use crate::method::{LawKind, MethodKind};
 use crate::render::RendererChoice;
 use crate::study::compare::{CONTENDERS, pick};
 use crate::vision::{ExtractorSettings, Landmarks};

@@ -9,12 +9,13 @@ use sha2::{Digest, Sha256};
 use super::design::{self, Design, SOBOL_AXES};
 use super::settings::{self, Case};
 use super::value::Value;
+use crate::document::{Node, Value as Read};
 use crate::episode::Setup;
 use crate::error::{Error, Result};
+use crate::fault::Fault;
 use crate::random::Seed;
 use crate::render::RendererChoice;
-use crate::world::document::{Node, Value as Read};
-use crate::world::{Draft, World, WorldFault};
+use crate::world::{Draft, World};
 
 /// Most episodes of one study.
 pub const MOST_EPISODES: u64 = 100_000_000;
@@ -296,7 +297,7 @@ fn at_place(source: &Path, place: &str, line: Option<usize>, error: &Error) -> E
 /// Reads the file's tree and gathers its faults.
 struct Reader<'a> {
     source: &'a Path,
-    faults: Vec<WorldFault>,
+    faults: Vec<Fault>,
 }
 
 /// Fields of the file, and of an axis.
@@ -313,7 +314,7 @@ impl Reader<'_> {
     fn fault(&mut self, tree: &Node, place: &str, found: impl Into<String>, allowed: impl Into<String>) {
         let line = tree.locate(place).0;
         let (place, found, allowed) = (place.to_owned(), found.into(), allowed.into());
-        self.faults.push(WorldFault { place, found, allowed, owner: None, line });
+        self.faults.push(Fault { place, found, allowed, owner: None, line });
     }
 
     fn study(&mut self, tree: &Node, text: &str, seeds: Option<RangeInclusive<u64>>) -> Option<Study> {
@@ -465,13 +466,7 @@ impl Reader<'_> {
         match Value::read(node) {
             _ if !settings::exists(name) => {
                 let (found, allowed) = ("no setting".to_owned(), settings::near(name));
-                self.faults.push(WorldFault {
-                    place: format!("settings.{name}"),
-                    found,
-                    allowed,
-                    owner: None,
-                    line: node.line,
-                });
+                self.faults.push(Fault { place: format!("settings.{name}"), found, allowed, owner: None, line: node.line });
             }
             Some(value) => found.push((name.to_owned(), value)),
             None => self.fault(tree, &format!("settings.{name}"), node.describe(), "a number, a text, a list or a table"),

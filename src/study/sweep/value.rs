@@ -4,7 +4,7 @@ use std::fmt;
 
 use serde::Serialize;
 
-use crate::world::document::{Node, Value as Read};
+use crate::document::{Node, Value as Read};
 
 /// A value of a setting.
 #[derive(Debug, Clone, PartialEq, Serialize)]

@@ -15,7 +15,8 @@ use std::path::Path;
 
 use super::picture::Pictures;
 use super::polygon::{edges, reflex_corner, self_intersection, signed_area};
-use super::{World, WorldFault, WorldSpec};
+use super::{World, WorldSpec};
+use crate::fault::Fault;
 use crate::geometry::Vector2;
 
 /// How deep a body may stand in a wall or another body, and how far outside the room a zone's corner may lie, m. Contact is
@@ -29,7 +30,7 @@ const LEAST_SIZE_M: f64 = 5e-3;
 const GREATEST_M: f64 = 1000.0;
 
 /// All faults of a world's values and places. `known` are the faults of its form, found before; no fault is told twice.
-pub(super) fn check(spec: &WorldSpec, known: &[WorldFault]) -> Vec<WorldFault> {
+pub(super) fn check(spec: &WorldSpec, known: &[Fault]) -> Vec<Fault> {
     let mut faults = Faults { known: known.to_vec(), found: Vec::new() };
     check_name(spec, &mut faults);
     room::check_values(spec, &mut faults);
@@ -72,8 +73,8 @@ fn check_name(spec: &WorldSpec, faults: &mut Faults) {
 
 /// Collects faults, each place once.
 struct Faults {
-    known: Vec<WorldFault>,
-    found: Vec<WorldFault>,
+    known: Vec<Fault>,
+    found: Vec<Fault>,
 }
 
 impl Faults {
@@ -81,7 +82,7 @@ impl Faults {
     fn add(&mut self, place: impl Into<String>, found: impl Into<String>, allowed: impl Into<String>) {
         let place = place.into();
         if !self.known.iter().any(|f| is_part(&f.place, &place) || is_part(&place, &f.place)) {
-            self.found.push(WorldFault { place, found: found.into(), allowed: allowed.into(), owner: None, line: None });
+            self.found.push(Fault { place, found: found.into(), allowed: allowed.into(), owner: None, line: None });
         }
     }
 

@@ -1,0 +1,501 @@
+//! What a set will hold: places, headings, conditions, and the parts that the work is cut into.
+
+use std::f64::consts::{PI, TAU};
+use std::path::{Path, PathBuf};
+
+use rand_pcg::rand_core::Rng;
+
+use super::conditions::{Condition, Staged};
+use crate::dataset::film;
+use crate::error::{Error, Result};
+use crate::geometry::{Pose, Vector2, angle_of, wrap};
+use crate::panorama::Projection;
+use crate::panorama_set::{ConditionDocument, Document, Frame, GridDocument, Instance, Layout, Place};
+use crate::random::{Seed, Stream};
+use crate::render::RendererInfo;
+use crate::storage::{io_error, sha256};
+use crate::world::World;
+use crate::world::polygon::{bounds, contains_within};
+
+/// Most frames of a part. A part is the unit of work: it is whole or not there, and a shard takes whole parts.
+pub const PART_FRAMES: usize = 64;
+/// Most poses of a set.
+const MOST_SPOTS: usize = 10_000_000;
+/// Most beginnings of a grid that are tried along each axis.
+const MOST_BEGINS: usize = 40;
+/// Tries for each random place before the room is called too crowded.
+const TRIES: usize = 1000;
+/// Home lies on a place of the grid if it is as near as this, m.
+const ON_PLACE_M: f64 = 1e-6;
+
+/// Where panoramas are taken.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Places {
+    /// An even grid.
+    Grid {
+        /// Places along x.
+        columns: usize,
+        /// Places along y.
+        rows: usize,
+        /// Distance between neighbours, m.
+        spacing_m: f64,
+        /// Place with the least x and y, m; by default the grid lies about the middle of the room with home on a place.
+        origin_m: Option<[f64; 2]>,
+    },
+    /// The points of a table with columns `x_m`, `y_m` and, perhaps, `heading_deg` or `heading_rad`.
+    Route(PathBuf),
+    /// So many random places where the robot can stand.
+    Random(usize),
+    /// The poses of a run: its folder, or its `trajectory.csv`.
+    Trajectory(PathBuf),
+}
+
+/// Which way the robot looks.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Headings {
+    /// As the places say; else as at home, and along the way on a route without headings.
+    Own,
+    /// Each of these at every place, rad.
+    Fixed(Vec<f64>),
+    /// So many random ones at every place.
+    Random(usize),
+}
+
+/// What a set is asked to be.
+#[derive(Debug, Clone)]
+pub struct Request {
+    /// Where.
+    pub places: Places,
+    /// Which way.
+    pub headings: Headings,
+    /// Under which conditions, at least one.
+    pub conditions: Vec<Condition>,
+    /// Columns and rows where they differ from the world's.
+    pub size_px: Option<(u32, u32)>,
+    /// How files are named.
+    pub layout: Layout,
+    /// Seed of all that is random.
+    pub seed: u64,
+    /// SPDX identifier.
+    pub licence: String,
+    /// The command, as far as the set's bytes depend on it.
+    pub command: String,
+}
+
+/// A pose of the set, the same in all conditions.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Spot {
+    place: Option<Place>,
+    robot: Pose,
+    time_s: Option<f64>,
+}
+
+/// A condition with the poses that can be taken in it.
+#[derive(Debug, Clone)]
+pub struct Stage {
+    /// The world under the condition.
+    pub staged: Staged,
+    /// Numbers of the poses that are taken.
+    kept: Vec<usize>,
+    /// Numbers of those that are not, and what is in the way.
+    left_out: Vec<(usize, String)>,
+}
+
+/// A unit of work: some frames of one condition.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Part {
+    /// Number in the set.
+    pub number: usize,
+    /// Number of its condition.
+    pub stage: usize,
+    /// First of the condition's frames.
+    pub first: usize,
+    /// How many.
+    pub count: usize,
+}
+
+/// All of a set before any of it is rendered.
+#[derive(Debug, Clone)]
+pub struct Plan {
+    /// The world as its file has it.
+    pub world: World,
+    /// Conditions.
+    pub stages: Vec<Stage>,
+    /// Parts, in order.
+    pub parts: Vec<Part>,
+    /// Projection of the panoramas.
+    pub projection: Projection,
+    request: Request,
+    spots: Vec<Spot>,
+    grid: Option<GridDocument>,
+}
+
+impl Plan {
+    /// Lays a set out: finds the poses, stages the conditions, leaves out where the robot cannot stand.
+    ///
+    /// # Errors
+    /// When the places do not fit the room, a table cannot be read, the layout cannot hold them, or nothing is left to take.
+    pub fn new(world: &World, request: Request) -> Result<Self> {
+        let (spots, grid) = spots(world, &request)?;
+        check_layout(&request, grid.as_ref())?;
+        let projection = request.layout.projection(
+            request.size_px.map_or_else(|| world.projection(), |(width, height)| world.projection_of_size(width, height)),
+        );
+        let mut names: Vec<String> = request.conditions.iter().map(Condition::name).collect();
+        names.sort();
+        if let Some(twice) = names.windows(2).find(|w| w[0] == w[1]) {
+            return Err(invalid("--conditions", format!("`{}` twice", twice[0]), "each condition once"));
+        }
+        let seed = Seed(request.seed);
+        let mut stages = Vec::new();
+        for condition in &request.conditions {
+            let staged = condition.stage(world, seed)?;
+            let bodies = staged.world.body_poses();
+            let (mut kept, mut left_out) = (Vec::new(), Vec::new());
+            for (k, spot) in spots.iter().enumerate() {
+                match staged.world.is_free(&spot.robot, 0.0, &bodies) {
+                    Ok(()) => kept.push(k),
+                    Err(what) => left_out.push((k, what)),
+                }
+            }
+            stages.push(Stage { staged, kept, left_out });
+        }
+        let mut parts = Vec::new();
+        for (stage, Stage { kept, .. }) in stages.iter().enumerate() {
+            for first in (0..kept.len()).step_by(PART_FRAMES) {
+                let count = PART_FRAMES.min(kept.len() - first);
+                parts.push(Part { number: parts.len(), stage, first, count });
+            }
+        }
+        if parts.is_empty() {
+            let what = stages.first().and_then(|s| s.left_out.first()).map_or("", |(_, what)| what.as_str());
+            let found = format!("{} poses, and the robot can stand at none of them (`{what}` is in the way)", spots.len());
+            return Err(invalid("poses of the set", found, "poses in the room and outside its bodies"));
+        }
+        Ok(Self { world: world.clone(), stages, parts, projection, request, spots, grid })
+    }
+
+    /// What was asked for.
+    #[must_use]
+    pub fn request(&self) -> &Request {
+        &self.request
+    }
+
+    /// Frames in all.
+    #[must_use]
+    pub fn frames(&self) -> usize {
+        self.stages.iter().map(|s| s.kept.len()).sum()
+    }
+
+    /// Poses left out, in all conditions.
+    #[must_use]
+    pub fn left_out(&self) -> usize {
+        self.stages.iter().map(|s| s.left_out.len()).sum()
+    }
+
+    /// The frames of a part.
+    pub fn part_frames(&self, part: Part) -> impl Iterator<Item = Frame> + '_ {
+        self.stage_frames(part.stage).skip(part.first).take(part.count)
+    }
+
+    /// The frames of a condition.
+    pub fn stage_frames(&self, stage: usize) -> impl Iterator<Item = Frame> + '_ {
+        let (condition, kept) = (self.stages[stage].staged.condition.name(), &self.stages[stage].kept);
+        kept.iter().map(move |&k| {
+            let Spot { place, robot, time_s } = self.spots[k];
+            Frame { number: stage * self.spots.len() + k, spot: k, condition: condition.clone(), place, robot, time_s }
+        })
+    }
+
+    /// The poses that were left out, as a table.
+    #[must_use]
+    pub fn left_out_csv(&self) -> String {
+        use std::fmt::Write;
+        let mut text = "condition,spot,row,column,x_m,y_m,heading_rad,in_the_way\n".to_owned();
+        for stage in &self.stages {
+            for (k, what) in &stage.left_out {
+                let Spot { place, robot: p, .. } = self.spots[*k];
+                let [i, j] = place.map_or([const { String::new() }; 2], |p| [p.i.to_string(), p.j.to_string()]);
+                let what = what.replace('"', "\"\"");
+                let name = stage.staged.condition.name();
+                let _ = writeln!(text, "{name},{k},{i},{j},{},{},{},\"{what}\"", p.x, p.y, p.heading);
+            }
+        }
+        text
+    }
+
+    /// What the set is, for its `dataset.json`.
+    #[must_use]
+    pub fn document(&self, renderer: &RendererInfo) -> Document {
+        let (world, request) = (&self.world, &self.request);
+        let heading_rad = self.spots.first().map(|s| s.robot.heading);
+        let heading_rad = heading_rad.filter(|h| self.spots.iter().all(|s| s.robot.heading == *h));
+        let landmark = |id: u16| world.landmarks().iter().any(|b| b.instance == id);
+        let conditions = self.stages.iter().map(|stage| ConditionDocument {
+            name: stage.staged.condition.name(),
+            given: stage.staged.condition.given().to_owned(),
+            description: stage.staged.description.clone(),
+            world_sha256: stage.staged.world.sha256.clone(),
+            frames: stage.kept.len(),
+            left_out: stage.left_out.len(),
+        });
+        Document {
+            format: "wayhome-dataset/1".into(),
+            layout: request.layout,
+            command: request.command.clone(),
+            version: env!("CARGO_PKG_VERSION").into(),
+            seed: request.seed,
+            licence: request.licence.clone(),
+            world: world.spec.name.clone(),
+            world_sha256: world.sha256.clone(),
+            renderer: match renderer.kind.as_str() {
+                // The bytes of the CPU renderer do not depend on the processor.
+                "cpu" => "cpu".into(),
+                kind => format!("{kind}: {}, {}", renderer.adapter, renderer.driver),
+            },
+            projection: self.projection,
+            columns: if request.layout.is_clockwise() { "clockwise" } else { "anticlockwise" }.into(),
+            camera_height_m: world.spec.camera.height_m,
+            range_unit: "mm; 65535 stands for all that is farther".into(),
+            home: world.home.into(),
+            poses_sha256: sha256(&self.spots.iter().flat_map(pose_bytes).collect::<Vec<u8>>()),
+            heading_rad,
+            grid: self.grid.clone(),
+            instances: world.instances().into_iter().map(|(id, name)| Instance { id, name, landmark: landmark(id) }).collect(),
+            conditions: conditions.collect(),
+            frames: self.frames(),
+            parts: self.parts.len(),
+            frames_per_part: PART_FRAMES,
+        }
+    }
+}
+
+fn pose_bytes(spot: &Spot) -> impl Iterator<Item = u8> + use<> {
+    let Pose { x, y, heading } = spot.robot;
+    [x, y, heading, spot.time_s.unwrap_or(f64::NAN)].into_iter().flat_map(f64::to_le_bytes)
+}
+
+fn invalid(what: &str, found: impl Into<String>, allowed: impl Into<String>) -> Error {
+    Error::Invalid { what: what.into(), found: found.into(), allowed: allowed.into() }
+}
+
+/// Refuses what a layout cannot hold.
+fn check_layout(request: &Request, grid: Option<&GridDocument>) -> Result<()> {
+    let one_heading =
+        matches!(&request.headings, Headings::Own) || matches!(&request.headings, Headings::Fixed(h) if h.len() == 1);
+    if request.layout == Layout::Paper {
+        return Err(invalid(
+            "--layout",
+            "paper",
+            "a layout that is written: vardy, moeller, image-database, webdataset, folder",
+        ));
+    }
+    if request.layout.needs_grid() && (grid.is_none() || !one_heading) {
+        let found = if grid.is_none() { "no --grid" } else { "several headings at a place" };
+        let allowed = "a grid with one heading for all: it holds one picture a place";
+        return Err(invalid(&format!("poses for layout {}", request.layout.name()), found, allowed));
+    }
+    if request.layout == Layout::ImageDatabase && grid.is_some_and(|g| g.spacing_m < 0.001) {
+        return Err(invalid(
+            "--spacing-m",
+            grid.map_or(0.0, |g| g.spacing_m).to_string(),
+            "0.001 or more: names count millimetres",
+        ));
+    }
+    Ok(())
+}
+
+fn spots(world: &World, request: &Request) -> Result<(Vec<Spot>, Option<GridDocument>)> {
+    let seed = Seed(request.seed);
+    let mut grid = None;
+    let (mut own, mut places): (bool, Vec<Spot>) = (true, Vec::new());
+    match &request.places {
+        Places::Grid { columns, rows, spacing_m, origin_m } => {
+            let laid = lay_grid(world, (*columns, *rows), *spacing_m, *origin_m)?;
+            // x fastest, from the least y up.
+            for i in (0..*rows).rev() {
+                for j in 0..*columns {
+                    let [x, y] = laid.first_m;
+                    let robot = Pose::new(x + j as f64 * spacing_m, y - i as f64 * spacing_m, world.home.heading);
+                    places.push(Spot { place: Some(Place { i, j }), robot, time_s: None });
+                }
+            }
+            grid = Some(laid);
+        }
+        Places::Route(path) => places = route(path)?,
+        Places::Random(count) => {
+            if !(1..=MOST_SPOTS).contains(count) {
+                return Err(invalid("--random", count.to_string(), format!("1 to {MOST_SPOTS}")));
+            }
+            own = false;
+            places = random_places(world, *count, &mut seed.stream("dataset/places"))?;
+        }
+        Places::Trajectory(path) => {
+            let file = if path.is_dir() { path.join("trajectory.csv") } else { path.clone() };
+            let spot = |frame: film::Frame| Spot { place: None, robot: frame.robot, time_s: Some(frame.time_s) };
+            places = film::load(&file)?.into_iter().map(spot).collect();
+        }
+    }
+    let each = match &request.headings {
+        Headings::Own => 1,
+        Headings::Fixed(headings) => headings.len(),
+        Headings::Random(count) => *count,
+    };
+    if !(1..=MOST_SPOTS).contains(&places.len().saturating_mul(each)) {
+        let found = format!("{} places with {each} headings", places.len());
+        return Err(invalid("poses of the set", found, format!("1 to {MOST_SPOTS} poses")));
+    }
+    let mut turns = seed.stream("dataset/headings");
+    let spots = places.into_iter().flat_map(|spot| {
+        let headings: Vec<f64> = match &request.headings {
+            Headings::Own if own => vec![spot.robot.heading],
+            Headings::Own => vec![world.home.heading],
+            Headings::Fixed(headings) => headings.iter().map(|h| wrap(*h)).collect(),
+            Headings::Random(count) => (0..*count).map(|_| wrap(TAU * uniform(&mut turns) - PI)).collect(),
+        };
+        headings.into_iter().map(move |heading| Spot { robot: Pose { heading, ..spot.robot }, ..spot })
+    });
+    Ok((spots.collect(), grid))
+}
+
+/// A number in [0, 1).
+fn uniform(stream: &mut Stream) -> f64 {
+    (stream.next_u64() >> 11) as f64 / (1_u64 << 53) as f64
+}
+
+fn random_places(world: &World, count: usize, stream: &mut Stream) -> Result<Vec<Spot>> {
+    let (low, high) = bounds(&world.outline);
+    let bodies = world.body_poses();
+    let mut places = Vec::with_capacity(count);
+    let mut tries = 0;
+    while places.len() < count {
+        if tries > TRIES * (places.len() + 10) {
+            let found = format!("{} free places in {tries} tries", places.len());
+            return Err(invalid("--random", found, "a room with free places for the robot"));
+        }
+        tries += 1;
+        let (u, v) = (uniform(stream), uniform(stream));
+        let robot = Pose::new(low.x + u * (high.x - low.x), low.y + v * (high.y - low.y), 0.0);
+        if world.is_free(&robot, 0.0, &bodies).is_ok() {
+            places.push(Spot { place: None, robot, time_s: None });
+        }
+    }
+    Ok(places)
+}
+
+/// Puts a grid into the room.
+fn lay_grid(
+    world: &World,
+    (columns, rows): (usize, usize),
+    spacing_m: f64,
+    origin_m: Option<[f64; 2]>,
+) -> Result<GridDocument> {
+    if !(spacing_m > 0.0 && spacing_m.is_finite()) {
+        return Err(invalid("--spacing-m", spacing_m.to_string(), "a length greater than 0"));
+    }
+    if columns == 0 || rows == 0 || columns.saturating_mul(rows) > MOST_SPOTS {
+        return Err(invalid("--grid", format!("{columns}x{rows}"), format!("1 to {MOST_SPOTS} places")));
+    }
+    let (low, high) = bounds(&world.outline);
+    let size = |count: usize| (count - 1) as f64 * spacing_m;
+    let too_large = || {
+        let found =
+            format!("{columns}x{rows} places {spacing_m} m apart, which take {:.2} x {:.2} m", size(columns), size(rows));
+        let room = high - low;
+        invalid("--grid", found, format!("what fits into the room of {:.2} x {:.2} m", room.x, room.y))
+    };
+    let room = |lowest: Vector2<f64>| {
+        let inside = |i: usize, j: usize| {
+            contains_within(&world.outline, lowest + Vector2::new(j as f64, i as f64) * spacing_m, ON_PLACE_M)
+        };
+        let rim = [(0, 0), (0, columns - 1), (rows - 1, 0), (rows - 1, columns - 1)];
+        rim.into_iter().all(|(i, j)| inside(i, j)) && (0..rows).all(|i| (0..columns).all(|j| inside(i, j)))
+    };
+    let lowest = match origin_m {
+        Some([x, y]) => Vector2::new(x, y),
+        None => {
+            // Where the grid may begin along an axis: first with home on a place, the middle of the grid nearest to the room's
+            // first; at last about the room's middle.
+            let axis = |home: f64, low: f64, high: f64, count: usize| -> Vec<(f64, f64)> {
+                let centred = 0.5 * (low + high - size(count));
+                let fits = |begin: f64| begin >= low && begin + size(count) <= high;
+                let mut begins: Vec<(f64, f64)> = (0..count)
+                    .map(|k| home - k as f64 * spacing_m)
+                    .filter(|b| fits(*b))
+                    .map(|b| ((b - centred).abs(), b))
+                    .collect();
+                begins.sort_by(|a, b| a.0.total_cmp(&b.0));
+                begins.truncate(MOST_BEGINS);
+                if begins.is_empty() && fits(centred) {
+                    begins.push((0.0, centred));
+                }
+                begins
+            };
+            let home = world.home.position();
+            let (along_x, along_y) = (axis(home.x, low.x, high.x, columns), axis(home.y, low.y, high.y, rows));
+            let mut begins: Vec<(f64, Vector2<f64>)> = along_x
+                .iter()
+                .flat_map(|(dx, x)| along_y.iter().map(move |(dy, y)| (dx * dx + dy * dy, Vector2::new(*x, *y))))
+                .collect();
+            begins.sort_by(|a, b| a.0.total_cmp(&b.0));
+            let first = begins.first().ok_or_else(too_large)?.1;
+            // In a room with corners that reach in, the first that is all inside; where none is, the first tells what is not.
+            begins.iter().map(|(_, begin)| *begin).find(|begin| room(*begin)).unwrap_or(first)
+        }
+    };
+    if lowest.x + size(columns) > high.x || lowest.y + size(rows) > high.y || lowest.x < low.x || lowest.y < low.y {
+        return Err(too_large());
+    }
+    let at = |i: usize, j: usize| lowest + Vector2::new(j as f64, (rows - 1 - i) as f64) * spacing_m;
+    let places = || (0..rows).flat_map(|i| (0..columns).map(move |j| (i, j)));
+    if let Some((i, j)) = places().find(|&(i, j)| !contains_within(&world.outline, at(i, j), ON_PLACE_M)) {
+        let (p, n) = (at(i, j), columns * rows);
+        let found = format!("place ({i}, {j}) of {n} at ({:.3}, {:.3}) m, outside the room", p.x, p.y);
+        return Err(invalid("--grid", found, "a grid inside the room; --origin moves it"));
+    }
+    let home = world.home.position();
+    let home = places().find(|&(i, j)| (at(i, j) - home).norm() < ON_PLACE_M).map(|(i, j)| [i, j]);
+    Ok(GridDocument { rows, columns, spacing_m, first_m: at(0, 0).into(), home })
+}
+
+/// Reads a route.
+fn route(path: &Path) -> Result<Vec<Spot>> {
+    let text = std::fs::read(path).map_err(io_error("read", path))?;
+    let fault = |message: String| Error::Parse { path: path.to_owned(), message };
+    let mut table = csv::ReaderBuilder::new().trim(csv::Trim::All).flexible(true).from_reader(text.as_slice());
+    let header = table.headers().map_err(|e| fault(e.to_string()))?.clone();
+    let position = |name: &str| header.iter().position(|h| h == name);
+    let column = |name: &str| {
+        let found = header.iter().collect::<Vec<_>>().join(",");
+        position(name).ok_or_else(|| fault(format!("line 1: found `{found}`, expected a column `{name}`")))
+    };
+    let (x, y) = (column("x_m")?, column("y_m")?);
+    let heading = position("heading_rad").map(|k| (k, 1.0)).or(position("heading_deg").map(|k| (k, 1_f64.to_radians())));
+    let mut points = Vec::new();
+    for row in table.records() {
+        let row = row.map_err(|e| fault(e.to_string()))?;
+        let line = row.position().map_or(0, csv::Position::line);
+        let number = |k: usize| {
+            let cell = row.get(k).unwrap_or_default();
+            let found = cell.parse().ok().filter(|x: &f64| x.is_finite());
+            found.ok_or_else(|| {
+                fault(format!("line {line}, {}: found `{cell}`, expected a finite number", header.get(k).unwrap_or_default()))
+            })
+        };
+        let heading = heading.map(|(k, to_rad)| Ok::<_, Error>(to_rad * number(k)?)).transpose()?;
+        points.push((Vector2::new(number(x)?, number(y)?), heading));
+    }
+    if points.is_empty() {
+        return Err(fault("found no row, expected one for each point".to_owned()));
+    }
+    let along = |k: usize| {
+        // To the next point; at the end as before, and on one point alone along x.
+        let k = k.min(points.len().saturating_sub(2));
+        points.get(k + 1).map_or(0.0, |(next, _)| angle_of(next - points[k].0))
+    };
+    let spot = |(k, (p, heading)): (usize, &(Vector2<f64>, Option<f64>))| {
+        let robot = Pose::new(p.x, p.y, heading.unwrap_or_else(|| along(k)));
+        Spot { place: None, robot, time_s: None }
+    };
+    Ok(points.iter().enumerate().map(spot).collect())
+}

@@ -1,0 +1,230 @@
+//! Writing results without leaving half a file or taking someone else's.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+
+use crate::error::{Error, Result};
+use crate::storage::{self, PARTIAL, io_error, write_atomically};
+
+/// File that marks a folder as ours; it holds the name of the verb that writes it.
+pub(crate) const MARKER: &str = ".wayhome";
+
+/// A folder of results that one verb of the program writes.
+///
+/// A folder that the same verb wrote before may be written again; one that holds anything else is refused. Every file appears
+/// whole or not at all: it is written under another name and then renamed.
+#[derive(Debug)]
+pub struct OutputFolder {
+    path: PathBuf,
+    names: &'static [&'static str],
+    written: BTreeSet<String>,
+}
+
+impl OutputFolder {
+    /// Opens or creates the folder for `verb`, which writes files of the given names. A `#` in a name stands for any number:
+    /// `frame-#.png`; a `*` before it for any beginning: `*.svg`.
+    ///
+    /// # Errors
+    /// When the folder cannot be created or read, or holds what `verb` has not written.
+    pub fn open(path: &Path, verb: &str, names: &'static [&'static str]) -> Result<Self> {
+        fs::create_dir_all(path).map_err(io_error("create folder", path))?;
+        let held = files(path)?;
+        let marker = path.join(MARKER);
+        let refused = |found: String| Error::OutputTaken { path: path.to_owned(), found };
+        if !held.is_empty() {
+            match fs::read_to_string(&marker) {
+                Ok(owner) if owner.trim_end() == verb => {}
+                Ok(owner) => return Err(refused(format!("the results of `wayhome {}`", owner.trim_end()))),
+                Err(e) if e.kind() == io::ErrorKind::NotFound => return Err(refused(format!("`{}`", held[0]))),
+                Err(source) => return Err(Error::Io { action: "read", path: marker, source }),
+            }
+        }
+        if let Some(foreign) = held.iter().find(|h| *h != MARKER && !h.ends_with(PARTIAL) && !is_announced(names, h)) {
+            return Err(refused(format!("`{foreign}`")));
+        }
+        for partial in held.iter().filter(|h| h.ends_with(PARTIAL)) {
+            remove(&path.join(partial))?;
+        }
+        write_atomically(&marker, format!("{verb}\n").as_bytes())?;
+        Ok(Self { path: path.to_owned(), names, written: BTreeSet::new() })
+    }
+
+    /// Where it is.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Writes one of the folder's files.
+    ///
+    /// # Errors
+    /// When the file cannot be written.
+    ///
+    /// # Panics
+    /// When `name` is none of the names that the folder was opened with, which is a fault in this program.
+    pub fn write(&mut self, name: &str, bytes: &[u8]) -> Result<()> {
+        assert!(is_announced(self.names, name), "`{name}` is not announced");
+        write_atomically(&self.path.join(name), bytes)?;
+        self.written.insert(name.to_owned());
+        Ok(())
+    }
+
+    /// Begins one of the folder's files that is written piece by piece. It appears under its name with [`Self::complete`]; one that
+    /// is dropped before leaves nothing.
+    ///
+    /// # Errors
+    /// When the file cannot be created.
+    ///
+    /// # Panics
+    /// As [`Self::write`].
+    pub fn begin(&self, name: &'static str) -> Result<FolderFile> {
+        assert!(self.names.contains(&name), "`{name}` is not announced");
+        Ok(FolderFile { name, path: self.path.join(name), file: storage::GrowingFile::create(&self.path.join(name))? })
+    }
+
+    /// Puts a file that was written piece by piece in its place.
+    ///
+    /// # Errors
+    /// When what is left of it cannot be written.
+    pub fn complete(&mut self, file: FolderFile) -> Result<()> {
+        file.file.complete()?;
+        self.written.insert(file.name.to_owned());
+        Ok(())
+    }
+
+    /// Removes what an earlier run has left and this one has not written.
+    ///
+    /// # Errors
+    /// When a file cannot be removed.
+    pub fn finish(self) -> Result<()> {
+        let stale = |name: &String| is_announced(self.names, name) && !self.written.contains(name);
+        files(&self.path)?.iter().filter(|name| stale(name)).try_for_each(|name| remove(&self.path.join(name)))
+    }
+}
+
+/// Names of what is in a folder, sorted.
+pub(crate) fn files(path: &Path) -> Result<Vec<String>> {
+    let mut names = Vec::new();
+    for entry in fs::read_dir(path).map_err(io_error("read folder", path))? {
+        names.push(entry.map_err(io_error("read folder", path))?.file_name().to_string_lossy().into_owned());
+    }
+    names.sort();
+    Ok(names)
+}
+
+/// Whether a file's name is one of `names`.
+fn is_announced(names: &[&str], file: &str) -> bool {
+    names.iter().any(|name| match name.strip_prefix('*') {
+        Some(ending) => file.ends_with(ending),
+        None => is_numbered(name, file),
+    })
+}
+
+fn is_numbered(name: &str, file: &str) -> bool {
+    match name.split_once('#') {
+        None => name == file,
+        Some((before, after)) => {
+            let number = file.strip_prefix(before).and_then(|rest| rest.strip_suffix(after));
+            number.is_some_and(|n| !n.is_empty() && n.bytes().all(|b| b.is_ascii_digit()))
+        }
+    }
+}
+
+/// A file that is being written piece by piece, so that nobody has to hold all of it; see [`OutputFolder::begin`].
+#[derive(Debug)]
+pub struct FolderFile {
+    name: &'static str,
+    path: PathBuf,
+    file: storage::GrowingFile,
+}
+
+impl FolderFile {
+    /// Appends to it.
+    ///
+    /// # Errors
+    /// When it cannot be written.
+    pub fn append(&mut self, text: &str) -> Result<()> {
+        self.file.write_all(text.as_bytes()).map_err(io_error("write", &self.path))
+    }
+}
+
+pub(crate) fn remove(path: &Path) -> Result<()> {
+    match fs::remove_file(path) {
+        Err(source) if source.kind() != io::ErrorKind::NotFound => {
+            Err(Error::Io { action: "remove", path: path.to_owned(), source })
+        }
+        _ => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const NAMES: &[&str] = &["a.txt", "b.txt"];
+
+    #[test]
+    fn a_verb_may_write_its_folder_again() {
+        let base = tempfile::tempdir().unwrap();
+        let path = base.path().join("new/folder");
+        let mut first = OutputFolder::open(&path, "home", NAMES).unwrap();
+        first.write("a.txt", b"1").unwrap();
+        first.write("b.txt", b"1").unwrap();
+        first.finish().unwrap();
+        fs::write(path.join("a.txt.wayhome-partial"), "cut off").unwrap();
+        let mut second = OutputFolder::open(&path, "home", NAMES).unwrap();
+        second.write("a.txt", b"2").unwrap();
+        second.finish().unwrap();
+        assert_eq!(fs::read(path.join("a.txt")).unwrap(), b"2");
+        let mut held: Vec<_> = fs::read_dir(&path).unwrap().map(|e| e.unwrap().file_name()).collect();
+        held.sort();
+        assert_eq!(held, [".wayhome", "a.txt"], "what is stale is gone");
+    }
+
+    #[test]
+    fn a_growing_file_appears_whole_or_not_at_all() {
+        let base = tempfile::tempdir().unwrap();
+        let mut folder = OutputFolder::open(base.path(), "home", NAMES).unwrap();
+        let held = || fs::read_dir(base.path()).unwrap().count();
+        let mut file = folder.begin("a.txt").unwrap();
+        file.append("1").unwrap();
+        assert!(!base.path().join("a.txt").exists() && held() == 2);
+        drop(file);
+        assert_eq!(held(), 1, "the marker alone");
+        let mut file = folder.begin("a.txt").unwrap();
+        file.append("1").unwrap();
+        file.append("2").unwrap();
+        folder.complete(file).unwrap();
+        folder.finish().unwrap();
+        assert_eq!((fs::read(base.path().join("a.txt")).unwrap(), held()), (b"12".to_vec(), 2));
+    }
+
+    #[test]
+    fn what_others_wrote_stays() {
+        let base = tempfile::tempdir().unwrap();
+        fs::write(base.path().join("a.txt"), "mine").unwrap();
+        let error = OutputFolder::open(base.path(), "home", NAMES).unwrap_err().to_string();
+        assert!(error.contains("`a.txt`"), "{error}");
+        assert_eq!(fs::read(base.path().join("a.txt")).unwrap(), b"mine");
+
+        let numbered = base.path().join("numbered");
+        let mut first = OutputFolder::open(&numbered, "home", &["frame-#.png"]).unwrap();
+        first.write("frame-000001.png", b"1").unwrap();
+        first.write("frame-000002.png", b"2").unwrap();
+        first.finish().unwrap();
+        let mut second = OutputFolder::open(&numbered, "home", &["frame-#.png"]).unwrap();
+        second.write("frame-000001.png", b"1").unwrap();
+        second.finish().unwrap();
+        assert!(!numbered.join("frame-000002.png").exists());
+        fs::write(numbered.join("frame-x.png"), "mine").unwrap();
+        assert!(OutputFolder::open(&numbered, "home", &["frame-#.png"]).is_err());
+
+        let ours = base.path().join("ours");
+        OutputFolder::open(&ours, "home", NAMES).unwrap().finish().unwrap();
+        assert!(OutputFolder::open(&ours, "render", NAMES).unwrap_err().to_string().contains("wayhome home"));
+        fs::write(ours.join("notes.md"), "mine").unwrap();
+        assert!(OutputFolder::open(&ours, "home", NAMES).unwrap_err().to_string().contains("notes.md"));
+    }
+}

@@ -1,0 +1,175 @@
+//! Files on disk that appear whole or not at all, their fingerprints, and how much room is left for more.
+
+mod folder;
+
+use std::fs;
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+
+use sha2::{Digest, Sha256};
+
+use crate::error::{Error, Result};
+
+pub use folder::{FolderFile, OutputFolder};
+pub(crate) use folder::{MARKER, files, remove};
+
+/// Ending of files that are still being written.
+pub const PARTIAL: &str = ".wayhome-partial";
+
+/// A name that no other process takes at the same time, on this machine or on another one that sees the folder.
+pub(crate) fn partial_name(path: &Path) -> PathBuf {
+    let since = std::time::UNIX_EPOCH.elapsed().unwrap_or_default();
+    let mut name = path.file_name().unwrap_or_default().to_owned();
+    name.push(format!(".{:x}-{:x}{PARTIAL}", std::process::id(), since.as_nanos()));
+    path.with_file_name(name)
+}
+
+/// Writes a file under another name and renames it, so that it is never seen half written.
+///
+/// # Errors
+/// When the file cannot be written.
+pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<()> {
+    let partial = partial_name(path);
+    fs::write(&partial, bytes).and_then(|()| fs::rename(&partial, path)).map_err(|source| {
+        // Best effort: the write itself is what failed and what the caller hears about.
+        let _ = fs::remove_file(&partial);
+        Error::Io { action: "write", path: path.to_owned(), source }
+    })
+}
+
+/// Indented JSON with a line end.
+pub fn json(value: &impl serde::Serialize) -> String {
+    // Plain structs with text keys always serialise; NaN becomes null.
+    let mut text = serde_json::to_string_pretty(value).unwrap_or_default();
+    text.push('\n');
+    text
+}
+
+/// An [`Error::Io`] for this action on this path.
+pub fn io_error(action: &'static str, path: &Path) -> impl Fn(io::Error) -> Error {
+    move |source| Error::Io { action, path: path.to_owned(), source }
+}
+
+/// SHA-256 of some bytes, lower-case hexadecimal.
+#[must_use]
+pub fn sha256(bytes: &[u8]) -> String {
+    hex(&Sha256::digest(bytes))
+}
+
+/// SHA-256 and length of a file, which is read piece by piece.
+///
+/// # Errors
+/// When the file cannot be read.
+pub fn sha256_of_file(path: &Path) -> io::Result<(String, u64)> {
+    let mut file = fs::File::open(path)?;
+    let (mut hash, mut bytes) = (Sha256::new(), 0);
+    let mut buffer = vec![0; 1 << 17];
+    loop {
+        match io::Read::read(&mut file, &mut buffer)? {
+            0 => return Ok((hex(&hash.finalize()), bytes)),
+            n => {
+                hash.update(&buffer[..n]);
+                bytes += n as u64;
+            }
+        }
+    }
+}
+
+fn hex(digest: &[u8]) -> String {
+    digest.iter().map(|b| format!("{b:02x}")).collect()
+}
+
+/// A file that is written piece by piece and appears under its name when it is whole. One that is dropped before leaves nothing.
+#[derive(Debug)]
+pub struct GrowingFile {
+    path: PathBuf,
+    partial: PathBuf,
+    writer: io::BufWriter<fs::File>,
+    hash: Sha256,
+    bytes: u64,
+    complete: bool,
+}
+
+impl GrowingFile {
+    /// Begins a file.
+    ///
+    /// # Errors
+    /// When it cannot be created.
+    pub fn create(path: &Path) -> Result<Self> {
+        let partial = partial_name(path);
+        let file = fs::File::create(&partial).map_err(io_error("write", path))?;
+        let writer = io::BufWriter::with_capacity(1 << 18, file);
+        Ok(Self { path: path.to_owned(), partial, writer, hash: Sha256::new(), bytes: 0, complete: false })
+    }
+
+    /// Puts it in its place; gives its SHA-256 and length.
+    ///
+    /// # Errors
+    /// When what is left of it cannot be written.
+    pub fn complete(mut self) -> Result<(String, u64)> {
+        self.writer.flush().and_then(|()| fs::rename(&self.partial, &self.path)).map_err(io_error("write", &self.path))?;
+        self.complete = true;
+        Ok((hex(&std::mem::take(&mut self.hash).finalize()), self.bytes))
+    }
+}
+
+impl Write for GrowingFile {
+    fn write(&mut self, buffer: &[u8]) -> io::Result<usize> {
+        let count = self.writer.write(buffer)?;
+        self.hash.update(&buffer[..count]);
+        self.bytes += count as u64;
+        Ok(count)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.writer.flush()
+    }
+}
+
+impl Drop for GrowingFile {
+    fn drop(&mut self) {
+        if !self.complete {
+            // Best effort: whoever writes the file again replaces this.
+            let _ = fs::remove_file(&self.partial);
+        }
+    }
+}
+
+/// Bytes that this process may still write to the file system of an existing folder; `None` where the system does not tell.
+#[must_use]
+pub fn free_bytes(folder: &Path) -> Option<u64> {
+    #[cfg(unix)]
+    {
+        let about = rustix::fs::statvfs(folder).ok()?;
+        Some(about.f_bavail.saturating_mul(about.f_frsize))
+    }
+    #[cfg(not(unix))]
+    {
+        let _ = folder;
+        None
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_growing_file_is_there_when_it_is_whole() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a");
+        let held = || fs::read_dir(folder.path()).unwrap().count();
+        let mut file = GrowingFile::create(&path).unwrap();
+        file.write_all(b"ab").unwrap();
+        assert!(!path.exists() && held() == 1);
+        drop(file);
+        assert_eq!(held(), 0);
+        let mut file = GrowingFile::create(&path).unwrap();
+        file.write_all(b"abc").unwrap();
+        // The example of FIPS 180-2.
+        let abc = "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad";
+        assert_eq!(file.complete().unwrap(), (abc.to_owned(), 3));
+        assert_eq!((sha256_of_file(&path).unwrap(), sha256(b"abc")), ((abc.to_owned(), 3), abc.to_owned()));
+        assert!(free_bytes(folder.path()).is_none_or(|b| b > 0));
+    }
+}
