@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use anyhow::Result;
 use serde::Serialize;
+use strum::VariantArray;
 use wayhome::Error;
 use wayhome::estimation::paper::{PaperSettings, Transition};
 use wayhome::report::paper::{self as page, Evidence, Section, Target};
@@ -54,10 +55,8 @@ struct Text<'a> {
 const MAP_SPACING_M: f64 = 0.05;
 
 pub fn run(args: &ReproduceArgs, context: &Context) -> Result<Verdict> {
-    let wanted: Vec<Target> = Target::ALL
-        .into_iter()
-        .filter(|t| args.targets.is_empty() || args.targets.contains(&Some(*t)) || args.targets.contains(&None))
-        .collect();
+    let is_wanted = |t: &Target| args.targets.is_empty() || args.targets.contains(&Some(*t)) || args.targets.contains(&None);
+    let wanted: Vec<Target> = Target::VARIANTS.iter().copied().filter(is_wanted).collect();
     check_dataset(args, &wanted)?;
     let folder = OutputFolder::open(&args.out, "reproduce", page::FILES)?;
     let workshop = Workshop::new(args)?;
@@ -200,6 +199,6 @@ mod tests {
 
     #[test]
     fn targets_have_their_names() {
-        assert!(Target::ALL.iter().all(|target| crate::cli::args::name_of(TARGETS, &Some(*target)) == target.name()));
+        assert!(Target::VARIANTS.iter().all(|target| crate::cli::args::name_of(TARGETS, &Some(*target)) == target.name()));
     }
 }

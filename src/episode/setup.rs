@@ -4,6 +4,7 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use serde::Serialize;
+use strum::{EnumMessage, IntoStaticStr, VariantArray};
 
 use super::record::Record;
 use super::recorder::Recorder;
@@ -25,26 +26,28 @@ use crate::vision::ExtractorSettings;
 use crate::world::{CameraPreset, LightPreset, OpticsSpec, TaskSpec, World};
 
 /// What moves when the wheels are commanded.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, EnumMessage, IntoStaticStr, VariantArray)]
 #[serde(rename_all = "kebab-case")]
+#[strum(serialize_all = "kebab-case")]
 pub enum PlantKind {
     /// Wheels that slip, motors, encoders, collisions.
     Rapier,
-    /// The unicycle's kinematics with perfect odometry; walls and bodies do not stop it.
+    /// The unicycle's kinematics with perfect odometry; nothing stops it.
     Unicycle,
 }
 
 /// Where bearings come from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, EnumMessage, IntoStaticStr, VariantArray)]
 #[serde(rename_all = "kebab-case")]
+#[strum(serialize_all = "kebab-case")]
 pub enum Bearings {
-    /// Features of rendered panoramas, matched to those of the home panorama.
+    /// Features of rendered panoramas, found again from the home panorama.
     Rendered,
-    /// True bearings of the landmark bodies' centres, hidden by what stands in between.
+    /// True bearings of the landmark bodies' centres, where nothing hides them.
     Ideal,
     /// Ideal bearings with noise, drop-outs and false matches.
     Noisy,
-    /// Features of panoramas on disk, matched to those of the set's home panorama.
+    /// Features of the panoramas of a set on disk.
     Dataset,
 }
 

@@ -11,6 +11,7 @@ use std::fmt;
 use std::str::FromStr;
 
 use serde::{Serialize, Serializer};
+use strum::{EnumMessage, IntoStaticStr, VariantArray};
 
 use crate::control::escape::Escape;
 use crate::control::vectors::VectorLaw;
@@ -24,21 +25,23 @@ use paper::PaperHoming;
 use vector::VectorHoming;
 
 /// Homing methods by name. A method is read from its name and shown by it: `alv`, or `exec:python3 my_method.py`.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, EnumMessage, IntoStaticStr)]
+#[strum(serialize_all = "kebab-case")]
 pub enum MethodKind {
-    /// The anchored filter: nothing known at the start.
+    /// Filter that starts from nothing and anchors home when it can.
     AnchoredEkf,
-    /// The paper's six-state EKF on three landmarks, started at a supposed pose.
+    /// The paper's six-state filter on three landmarks, started at a supposed pose.
     PaperEkf,
-    /// Average landmark vector; without a compass the two bearing sets are aligned by their circular mean difference.
+    /// Average landmark vector; no estimate. Without a compass, this and those below align the two sets of bearings by their circular
+    /// mean difference.
     Alv,
-    /// Tron and Daniilidis' descent, aligned like it.
+    /// Tron and Daniilidis' descent on bearings; no estimate.
     TronDaniilidis,
-    /// Weber's bearing vectors, aligned like it.
+    /// Weber's bearing vectors; no estimate.
     Weber,
-    /// Visual servoing with one constant range, aligned like it.
+    /// Visual servoing with one constant range; no estimate.
     Ibvs,
-    /// A program of the user's own.
+    /// A program of your own, such as exec:"python3 my_method.py"; the README says what it is told and answers.
     Exec(ExecCommand),
 }
 
@@ -50,15 +53,7 @@ impl MethodKind {
     /// Name without what belongs to one program.
     #[must_use]
     pub fn name(&self) -> &'static str {
-        match self {
-            Self::AnchoredEkf => "anchored-ekf",
-            Self::PaperEkf => "paper-ekf",
-            Self::Alv => "alv",
-            Self::TronDaniilidis => "tron-daniilidis",
-            Self::Weber => "weber",
-            Self::Ibvs => "ibvs",
-            Self::Exec(_) => "exec",
-        }
+        self.into()
     }
 
     /// Fewest landmarks in the home snapshot that the method can do with.
@@ -114,12 +109,13 @@ impl Serialize for MethodKind {
 }
 
 /// Control laws by name.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, EnumMessage, IntoStaticStr, VariantArray)]
 #[serde(rename_all = "kebab-case")]
+#[strum(serialize_all = "kebab-case")]
 pub enum LawKind {
-    /// omega proportional to the heading error.
+    /// Turn rate proportional to the heading error.
     Proportional,
-    /// omega = beta (v / Rc) sgn(theta').
+    /// The paper's switching law, omega = beta (v / Rc) sgn(theta').
     Lyapunov,
 }
 

@@ -1,6 +1,7 @@
 //! Layouts, and what a frame's files are called in each.
 
 use serde::{Deserialize, Serialize};
+use strum::{EnumMessage, IntoStaticStr, VariantArray};
 
 use super::document::Document;
 use super::entry::{Frame, Names};
@@ -8,18 +9,21 @@ use super::{folder, image_database, moeller, vardy, webdataset};
 use crate::panorama::{Projection, ProjectionKind};
 
 /// How a set's files are named and what their pixels mean.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, EnumMessage, IntoStaticStr, VariantArray)]
 #[serde(rename_all = "kebab-case")]
+#[strum(serialize_all = "kebab-case")]
 pub enum Layout {
-    /// Vardy's panoramic image database: a folder a condition, `<i>_<j>.pgm`; also `cv_<rows-1-i>_<j>_bw<bw>.pgm`.
+    /// Vardy's panoramic image database: CONDITION/I_J.pgm, grey, clockwise.
+    ///
+    /// Also `cv_<rows-1-i>_<j>_bw<bw>.pgm`.
     Vardy,
-    /// Moeller's: a `.db` line about the grid and folders with `cv_<x>_<y>_bw<bw>.pgm`.
+    /// Moeller's: a .db line about the grid, and folders with cv_X_Y_bwBW.pgm, grey, clockwise.
     Moeller,
-    /// The BrainsOnBoard image database: `database_entries.csv` and `database_metadata.yaml`.
+    /// BrainsOnBoard: database_entries.csv, database_metadata.yaml, PNG.
     ImageDatabase,
-    /// Tar shards for `webdataset`.
+    /// Tar shards for training with `webdataset`.
     Webdataset,
-    /// A folder a condition with numbered files.
+    /// A folder a condition; colours, range, instances and truth of each frame.
     Folder,
     /// The paper's own set, read only: `<i>_<j>.png` or `.pgm`.
     Paper,
@@ -32,14 +36,7 @@ impl Layout {
     /// What files and the command line call it.
     #[must_use]
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Vardy => "vardy",
-            Self::Moeller => "moeller",
-            Self::ImageDatabase => "image-database",
-            Self::Webdataset => "webdataset",
-            Self::Folder => "folder",
-            Self::Paper => "paper",
-        }
+        self.into()
     }
 
     /// Whether its pictures are grey.

@@ -46,13 +46,14 @@ pub use instructions::InstructionSet;
 pub use scene::Scene;
 
 /// Which renderer a person asks for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, strum::EnumMessage, strum::IntoStaticStr, strum::VariantArray)]
+#[strum(serialize_all = "kebab-case")]
 pub enum RendererChoice {
     /// A hardware GPU where there is one, else the CPU.
     Auto,
     /// Any graphics adapter, a software one included; an error where there is none.
     Gpu,
-    /// The CPU twin.
+    /// The CPU.
     Cpu,
 }
 

@@ -7,6 +7,7 @@
 use std::ops::{ControlFlow, RangeInclusive};
 
 use serde::Serialize;
+use strum::{EnumMessage, IntoStaticStr, VariantArray};
 
 use super::seeds::{OutcomeCounts, SeedEvent, SeedsSummary, Spread, run_seeds};
 use crate::episode::{Setup, SetupRecord, Summary};
@@ -18,16 +19,17 @@ use crate::world::World;
 pub const WRONG_CLAIM_M: f64 = 0.15;
 
 /// What gets worse.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, EnumMessage, IntoStaticStr, VariantArray)]
 #[serde(rename_all = "kebab-case")]
+#[strum(serialize_all = "kebab-case")]
 pub enum Axis {
-    /// Share of the home landmarks that are never seen on the way, percent.
+    /// Share of the home landmarks that are never seen on the way, 0 to 70 %.
     Hidden,
-    /// Coulomb friction of the drive wheels on the whole floor.
+    /// Coulomb friction of the drive wheels on the whole floor, 0.8 to 0.1.
     Friction,
-    /// Share of bearings that are false matches, percent, on top of those that the sensor makes itself.
+    /// Share of bearings that are false matches, 0 to 40 %, on top of those that the sensor makes itself.
     FalseMatches,
-    /// Standard deviation of the noise that is added to bearings, degrees.
+    /// Standard deviation of the noise that is added to bearings, 0.05 to 2 degrees.
     Noise,
 }
 
@@ -38,12 +40,7 @@ impl Axis {
     /// Name on the command line and in files.
     #[must_use]
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Hidden => "hidden",
-            Self::Friction => "friction",
-            Self::FalseMatches => "false-matches",
-            Self::Noise => "noise",
-        }
+        self.into()
     }
 
     /// Levels from good to bad, in the axis' own unit.

@@ -21,6 +21,7 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
+use strum::{EnumMessage, IntoStaticStr, VariantArray};
 
 use crate::geometry::direction;
 use crate::observation::{Bearing, HomeSnapshot, LandmarkId};
@@ -35,8 +36,9 @@ use objects::{Found, Objects, Place};
 use pyramid::Pyramid;
 
 /// What a landmark is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, EnumMessage, IntoStaticStr, VariantArray)]
 #[serde(rename_all = "kebab-case")]
+#[strum(serialize_all = "kebab-case")]
 pub enum Landmarks {
     /// Each feature is a landmark of its own: many, and each exact.
     Features,

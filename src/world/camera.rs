@@ -2,6 +2,7 @@
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use strum::{EnumMessage, IntoStaticStr, VariantArray};
 
 use crate::panorama::ProjectionKind;
 
@@ -47,8 +48,11 @@ impl Default for CameraSpec {
 
 /// A ready-made camera. The numbers are typical ones; those of noise follow from pixels of about 3 micrometres, which hold some
 /// 10,000 electrons, and from the amplification that a setting needs.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema, EnumMessage, IntoStaticStr, VariantArray,
+)]
 #[serde(rename_all = "kebab-case")]
+#[strum(serialize_all = "kebab-case")]
 pub enum CameraPreset {
     /// Shows colours as they are.
     #[default]

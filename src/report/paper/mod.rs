@@ -11,6 +11,8 @@ mod tables;
 use std::fs;
 use std::io;
 
+use strum::{EnumMessage, IntoStaticStr, VariantArray};
+
 use crate::error::{Error, Result};
 use crate::storage::OutputFolder;
 
@@ -19,46 +21,34 @@ pub use contest::contest;
 pub use observability::{map_svg, observability, summary as map_summary};
 pub use tables::{fig_five, fig_seven, fig_three, table_one, table_two};
 
-/// What can be reproduced.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize)]
+/// What can be reproduced, in the order of the page.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, EnumMessage, IntoStaticStr, VariantArray)]
 #[serde(rename_all = "kebab-case")]
+#[strum(serialize_all = "kebab-case")]
 pub enum Target {
-    /// Table I.
+    /// Table I: errors with accurate bearings.
     Table1,
-    /// Fig. 3.
+    /// Fig. 3: paths with accurate bearings.
     Fig3,
-    /// Table II.
+    /// Table II: errors with bearings from images, the paper's own set.
     Table2,
-    /// Fig. 5.
+    /// Fig. 5: paths on that set.
     Fig5,
-    /// Fig. 7.
+    /// Fig. 7: paths on Vardy's set.
     Fig7,
-    /// Fig. 8.
+    /// Fig. 8: time home beside other methods.
     Fig8,
-    /// The matrix O of (14).
+    /// Rank and condition of the matrix O of (14).
     Observability,
-    /// All claims.
+    /// A row for each claim: what holds, from which start, under which noise.
     Audit,
 }
 
 impl Target {
-    /// All of them, in the order of the page.
-    pub const ALL: [Self; 8] =
-        [Self::Table1, Self::Fig3, Self::Table2, Self::Fig5, Self::Fig7, Self::Fig8, Self::Observability, Self::Audit];
-
     /// Its name on the command line.
     #[must_use]
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Table1 => "table1",
-            Self::Fig3 => "fig3",
-            Self::Table2 => "table2",
-            Self::Fig5 => "fig5",
-            Self::Fig7 => "fig7",
-            Self::Fig8 => "fig8",
-            Self::Observability => "observability",
-            Self::Audit => "audit",
-        }
+        self.into()
     }
 }
 
@@ -119,15 +109,15 @@ pub fn write(mut folder: OutputFolder, sections: &[Section]) -> Result<()> {
         folder.write(name, bytes)?;
     }
     folder.write("README.md", page(&before, sections).as_bytes())?;
-    if Target::ALL.iter().all(|t| sections.iter().any(|s| s.target == *t)) { folder.finish() } else { Ok(()) }
+    if Target::VARIANTS.iter().all(|t| sections.iter().any(|s| s.target == *t)) { folder.finish() } else { Ok(()) }
 }
 
 /// The page with its sections in order: new ones as given, others as in the page `before`.
 fn page(before: &str, sections: &[Section]) -> String {
     let mut text = TITLE.to_owned();
-    for target in Target::ALL {
+    for target in Target::VARIANTS {
         let [begin, end] = ["begin", "end"].map(|edge| format!("<!-- {edge} {} -->\n", target.name()));
-        let body = match sections.iter().find(|s| s.target == target) {
+        let body = match sections.iter().find(|s| s.target == *target) {
             Some(section) => section.markdown.as_str(),
             None => match before.split_once(&begin).and_then(|(_, rest)| rest.split_once(&end)) {
                 Some((body, _)) => body,

@@ -2,26 +2,28 @@
 
 use rand_pcg::rand_core::Rng;
 use serde::Serialize;
+use strum::{EnumMessage, IntoStaticStr, VariantArray};
 
 use crate::panorama::Panorama;
 use crate::random::{Stream, standard_normal};
 use crate::world::{CameraPreset, LightPreset};
 
 /// One condition is changed at a time.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, EnumMessage, IntoStaticStr, VariantArray)]
 #[serde(rename_all = "kebab-case")]
+#[strum(serialize_all = "kebab-case")]
 pub enum Axis {
-    /// Distance from home, m.
+    /// Distance from home, 0.25 to 3 m.
     Distance,
-    /// Turn since home, degrees.
+    /// Turn since home, 0 to 180 degrees.
     Rotation,
-    /// Factor on all grey levels, clipped at white.
+    /// Factor on all grey levels, 0.25 to 2, clipped at white.
     Gain,
-    /// Exponent on all grey levels, white staying white.
+    /// Exponent on all grey levels, 0.5 to 2, white staying white.
     Gamma,
-    /// Standard deviation of noise on each channel of each pixel, at home too, grey levels of 255.
+    /// Standard deviation of noise on each channel of each pixel, at home too, 0 to 20 grey levels of 255.
     Noise,
-    /// Share of the turn that is hidden by things which were not there.
+    /// Share of the turn that is hidden by things which were not there, 0 to 70 %.
     Occlusion,
     /// Light of the world, by its presets.
     Light,
@@ -55,16 +57,7 @@ impl Axis {
     /// Name in files.
     #[must_use]
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Distance => "distance",
-            Self::Rotation => "rotation",
-            Self::Gain => "gain",
-            Self::Gamma => "gamma",
-            Self::Noise => "noise",
-            Self::Occlusion => "occlusion",
-            Self::Light => "light",
-            Self::Camera => "camera",
-        }
+        self.into()
     }
 
     /// What a level is called: a name or a number.
