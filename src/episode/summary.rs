@@ -239,6 +239,13 @@ impl Summary {
             version: env!("CARGO_PKG_VERSION"),
         }
     }
+
+    /// Whether the method claimed to be home and the robot came to rest outside the arrival radius: the one meaning of a wrong claim, in
+    /// all tables.
+    #[must_use]
+    pub fn is_wrong_claim(&self) -> bool {
+        self.claimed_home && self.outcome != Outcome::Home
+    }
 }
 
 impl EstimateErrors {

@@ -163,7 +163,7 @@ pub fn readme(comparison: &Comparison, command: &str, maps: &[String]) -> String
     let mut text = format!(
         "# Methods compared in `{}`\n\nMade by\n\n```sh\n{command}\n```\n\nwith wayhome {} (world file SHA-256 `{}`).\n\n![Share of runs that come \
          home](compare.svg)\n\nAll contenders run on `{}` with `{}` bearings from the same random starts (seeds {first} to {last}), at {} m/s, for \
-         {} s at most. *Home* claimed to be home and came to rest within {:.0} cm of it; *wrong claims* did so elsewhere. *Time ratio* is time \
+         {} s at most. *Home* claimed to be home and came to rest within {:.0} cm of it; *wrong claims* claimed it and came to rest farther off. *Time ratio* is time \
          over straight-line time and *path ratio* path over straight distance, medians of the runs that came home; *final* is the median \
          distance from home at the end of all runs. A homing vector says nothing of the distance: methods that steer by one slow down as it \
          shortens, hence their time ratio. ",

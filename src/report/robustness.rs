@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use crate::error::Result;
 use crate::storage::OutputFolder;
-use crate::study::robustness::{Axis, Cell, Robustness, WRONG_CLAIM_M};
+use crate::study::robustness::{Axis, Cell, Robustness};
 
 /// Names of all files of a study.
 pub const FILES: &[&str] = &["README.md", "robustness.csv", "robustness.svg"];
@@ -117,9 +117,8 @@ pub fn readme(study: &Robustness, command: &str) -> String {
          ![Share of runs that come home](robustness.svg)\n\n\
          Each row is seeds {first} to {last} of `{plant}` x `{bearings}` x `{method}` with the `{law}` law{renderer}: random \
          starts, nothing known, one condition changed and all others left as the world has them. *Home* is the share of runs that \
-         claimed to be home and came to rest within {radius:.0} cm of it, with its 95 % Wilson interval. *Wrong claims* ended more \
-         than {wrong:.0} cm from where they claimed home to be. *Time ratio* is time over straight-line time, of the runs that came \
-         home.\n",
+         claimed to be home and came to rest within {radius:.0} cm of it, with its 95 % Wilson interval. *Wrong claims* claimed it \
+         and came to rest farther off. *Time ratio* is time over straight-line time, of the runs that came home.\n",
         world = study.world,
         version = study.version,
         sha = study.world_sha256,
@@ -129,7 +128,6 @@ pub fn readme(study: &Robustness, command: &str) -> String {
         law = name(&setup.controller),
         renderer = study.renderer.as_ref().map_or_else(String::new, |kind| format!(", rendered by the {kind} renderer")),
         radius = 100.0 * setup.arrival_radius_m,
-        wrong = 100.0 * WRONG_CLAIM_M,
     );
     for axis in Axis::ALL {
         let cells: Vec<&Cell> = study.cells.iter().filter(|c| c.axis == axis).collect();

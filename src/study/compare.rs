@@ -124,7 +124,7 @@ pub struct Standing {
     pub home: usize,
     /// 95 % Wilson interval of their share.
     pub home_share_95: [f64; 2],
-    /// Runs that claimed to be home where home is not.
+    /// Runs that claimed to be home and came to rest outside the arrival radius.
     pub wrong_claims: usize,
     /// Time over straight-line time, of the runs that came home.
     pub time_ratio: Spread,
@@ -288,7 +288,7 @@ fn standing(contender: &Contender, random: &[Summary], grid: &[Summary], vectors
         runs: random.len(),
         home,
         home_share_95: wilson_95(home, random.len()),
-        wrong_claims: random.iter().filter(|r| r.claimed_home && r.outcome != Outcome::Home).count(),
+        wrong_claims: random.iter().filter(|r| r.is_wrong_claim()).count(),
         time_ratio: Spread::of(came().filter_map(|r| r.time_ratio)),
         path_ratio: Spread::of(came().map(|r| r.path_length_m / r.start_distance_m)),
         final_distance_m: Spread::of(random.iter().map(|r| r.final_distance_m)),

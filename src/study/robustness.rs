@@ -15,9 +15,6 @@ use crate::error::{Error, Result};
 use crate::sensor::Degradation;
 use crate::world::World;
 
-/// A claim to be home farther from it than this is a wrong one, m.
-pub const WRONG_CLAIM_M: f64 = 0.15;
-
 /// What gets worse.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, EnumMessage, IntoStaticStr, VariantArray)]
 #[serde(rename_all = "kebab-case")]
@@ -87,7 +84,7 @@ pub struct Cell {
     pub home: usize,
     /// 95 % Wilson interval of their share.
     pub home_share_95: [f64; 2],
-    /// Runs that claimed to be home more than [`WRONG_CLAIM_M`] away from it.
+    /// Runs that claimed to be home and came to rest outside the arrival radius.
     pub wrong_claims: usize,
     /// Runs by outcome.
     pub outcomes: OutcomeCounts,
@@ -219,9 +216,8 @@ fn with_friction(world: &World, friction: f64) -> Result<World> {
 
 impl Cell {
     fn new(axis: Axis, level: f64, runs: &[Summary], seeds: &RangeInclusive<u64>, world: &World, setup: &Setup) -> Self {
-        let SeedsSummary { home, home_share_95, outcomes, time_ratio, final_distance_m, .. } =
+        let SeedsSummary { home, home_share_95, wrong_claims, outcomes, time_ratio, final_distance_m, .. } =
             SeedsSummary::new(runs, seeds, world, setup);
-        let wrong_claims = runs.iter().filter(|r| r.claimed_home && r.final_distance_m > WRONG_CLAIM_M).count();
         Self { axis, level, runs: runs.len(), home, home_share_95, wrong_claims, outcomes, time_ratio, final_distance_m }
     }
 }
@@ -230,6 +226,7 @@ impl Cell {
 mod tests {
     use super::*;
     use crate::episode::Bearings;
+    use crate::method::MethodKind;
 
     #[test]
     fn a_friction_holds_everywhere_and_changes_nothing_else() {
@@ -238,6 +235,22 @@ mod tests {
         let icy = with_friction(&world, 0.1).unwrap();
         assert_eq!(icy.friction_at(world.home.position()), 0.1);
         assert!(icy.zones.is_empty() && icy.bodies == world.bodies && icy.wall_textures == world.wall_textures);
+    }
+
+    #[test]
+    fn wrong_claims_are_those_outside_the_arrival_radius() {
+        let world = World::open("lab").unwrap();
+        let setup = Setup { bearings: Bearings::Ideal, method: MethodKind::Alv, ..Setup::default() };
+        let watch = &|_: RobustnessEvent<'_>| ControlFlow::Continue(());
+        let study = run(&world, &setup, &[Axis::Noise], &(1..=8), 1, watch).unwrap();
+        let worst = study.cells.last().unwrap();
+        let noisy =
+            Setup { degradation: Degradation { noise_sd_rad: 2.0_f64.to_radians(), ..Degradation::default() }, ..setup };
+        let runs = run_seeds(&world, &noisy, 1..=8, 1, &|_| ControlFlow::Continue(())).unwrap();
+        let wrong = runs.iter().filter(|r| r.claimed_home && r.final_distance_m > world.spec.task.arrival_radius_m);
+        let off_cm: Vec<f64> = wrong.map(|r| 100.0 * r.final_distance_m).collect();
+        assert!(off_cm.iter().any(|cm| (5.0..15.0).contains(cm)), "a claim off by little counts, too: {off_cm:?}");
+        assert_eq!(worst.wrong_claims, off_cm.len());
     }
 
     #[test]

@@ -137,7 +137,7 @@ pub struct SeedsSummary {
     pub home_share_95: [f64; 2],
     /// Runs by outcome.
     pub outcomes: OutcomeCounts,
-    /// Runs that claimed to be home where home is not.
+    /// Runs that claimed to be home and came to rest outside the arrival radius.
     pub wrong_claims: usize,
     /// Time over straight-line time, of the runs that reached home.
     pub time_ratio: Spread,
@@ -226,7 +226,7 @@ impl SeedsSummary {
                 stuck: count(Outcome::Stuck),
                 failed: count(Outcome::Failed),
             },
-            wrong_claims: runs.iter().filter(|r| r.claimed_home && r.outcome != Outcome::Home).count(),
+            wrong_claims: runs.iter().filter(|r| r.is_wrong_claim()).count(),
             time_ratio: Spread::of(runs.iter().filter_map(|r| r.time_ratio)),
             final_distance_m: Spread::of(runs.iter().map(|r| r.final_distance_m)),
             claimed_distance_m: Spread::of(runs.iter().filter(|r| r.claimed_home).map(|r| r.final_distance_m)),

@@ -82,7 +82,7 @@ impl Page<'_> {
         add(self.sums.study.episodes_per_cell().to_string(), "seeds in each");
         let share = format!("{:.1} %", 100.0 * all.share());
         add(share, &format!("came home (95 %: {:.1} to {:.1})", 100.0 * low, 100.0 * high));
-        add(all.wrong_claims.to_string(), "claimed to be home elsewhere");
+        add(all.wrong_claims.to_string(), "claimed to be home, outside the arrival radius");
         add((all.others[3] + all.others[4]).to_string(), "panics and errors");
         *text += "</div>\n";
     }

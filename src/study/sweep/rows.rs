@@ -129,7 +129,8 @@ impl Row {
         self.outcome == Outcome::Home.name()
     }
 
-    /// Whether the method claimed to be home where home is not.
+    /// Whether the method claimed to be home and the robot came to rest outside the arrival radius, as
+    /// [`Summary::is_wrong_claim`].
     #[must_use]
     pub fn is_wrong_claim(&self) -> bool {
         self.claimed_home == Some(true) && !self.is_home()

@@ -80,7 +80,7 @@ pub struct Tally {
     pub home: usize,
     /// 95 % Wilson interval of their share.
     pub home_share_95: [f64; 2],
-    /// Those that claimed to be home elsewhere.
+    /// Those that claimed to be home and came to rest outside the arrival radius.
     pub wrong_claims: usize,
     /// Those that ended otherwise: timeout, lost, stuck, panic, error.
     pub others: [usize; 5],
