@@ -11,10 +11,10 @@ use rapier2d::prelude::{
 use super::chassis::PlanarVelocity;
 use super::hull::{HULL_FRICTION, HULL_RESTITUTION};
 use super::movers::is_solid;
-use super::polygon::{contains, edges, segments_cross};
 use super::slide::SlidingBody;
 use super::{Struck, Touched};
 use crate::geometry::{Pose, Vector2, atan2, sin_cos};
+use crate::world::polygon::{contains, edges, segments_cross};
 use crate::world::{Footprint, MotionSpec, World};
 
 /// Size of what moves, m. Rapier's tolerances scale with it: contacts may sink in by 0.5 mm and are foreseen at `TOUCH_GAP_M`.

@@ -14,9 +14,9 @@
 
 use super::chassis::{Chassis, PlanarVelocity};
 use super::movers::is_solid;
-use super::polygon::{bounding_radius, closest_on_segment, contains, edges};
 use super::{Struck, TOUCH_GAP_M, Touched};
 use crate::geometry::{Pose, Vector2, cross};
+use crate::world::polygon::{closest_on_segment, contains, edges};
 use crate::world::{Footprint, World};
 
 /// Coulomb friction of the robot's hull on walls and bodies.
@@ -68,7 +68,7 @@ impl Hull {
             radius: robot.radius_m,
             juts: jutting(&world.outline),
             outline: world.outline.clone(),
-            bodies: bodies.map(|(k, b)| (k, b.footprint.clone(), bounding_radius(&b.footprint))).collect(),
+            bodies: bodies.map(|(k, b)| (k, b.footprint.clone(), b.footprint.bounding_radius())).collect(),
         }
     }
 

@@ -30,7 +30,6 @@ mod gyro;
 mod hull;
 mod motor;
 mod movers;
-mod polygon;
 mod rapier_plant;
 mod script;
 mod slide;

@@ -8,9 +8,9 @@
 
 use rand::RngExt;
 
-use super::polygon::{contains, distance_to_footprint, edges, segments_cross};
 use crate::geometry::{Pose, Vector2};
 use crate::random::{Seed, Stream};
+use crate::world::polygon::{contains, edges, segments_cross};
 use crate::world::{Body, Footprint, MotionSpec, World};
 
 /// Free space that a mover keeps to the robot's body, m.
@@ -144,7 +144,7 @@ impl Mover {
     }
 
     fn would_crowd(&self, now: &Pose, next: &Pose, walkway: Walkway) -> bool {
-        let gap = |pose: &Pose| distance_to_footprint(&self.footprint, pose.inverse_transform(walkway.robot)) - walkway.radius;
+        let gap = |pose: &Pose| self.footprint.distance_to(pose.inverse_transform(walkway.robot)) - walkway.radius;
         let after = gap(next);
         after < CLEARANCE_M && after < gap(now)
     }

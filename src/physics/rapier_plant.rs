@@ -7,12 +7,12 @@ use super::gyro::Gyro;
 use super::hull::Hull;
 use super::motor::WheelDrive;
 use super::movers::{Movers, Walkway};
-use super::polygon::contains;
 use super::script::{Event, Script};
 use super::vicinity::{Near, Scene, Vicinity};
 use super::{Collision, Plant, PlantStep, Struck, Touched};
 use crate::geometry::{Pose, Twist, Vector2};
 use crate::random::Seed;
+use crate::world::polygon::contains;
 use crate::world::robot::WheelFault;
 use crate::world::{World, Zone};
 

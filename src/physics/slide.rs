@@ -6,9 +6,9 @@
 //! would have to act to give the greatest torque, the velocity (v, c omega) loses speed mu g along itself.
 
 use super::chassis::{PlanarVelocity, STANDARD_GRAVITY_M_S2};
-use super::polygon::contains;
 use crate::geometry::Vector2;
 use crate::world::Footprint;
+use crate::world::polygon::contains;
 
 /// Points along each side of the grid that a footprint's integrals are taken on.
 const GRID: u32 = 64;

@@ -8,8 +8,8 @@
 //! Distances are not measured in every substep either: a gap of 1 m stays a gap until robot and bodies together have gone 1 m.
 
 use super::movers::is_solid;
-use super::polygon::{bounding_radius, distance_to_footprint, distance_to_segment, edges};
 use crate::geometry::{Pose, Vector2};
+use crate::world::polygon::{distance_to_segment, edges};
 use crate::world::{Body, Footprint, MotionSpec, World};
 
 /// Gap below which rapier is asked, m: ten times the distance at which it foresees contacts.
@@ -73,7 +73,7 @@ impl Vicinity {
         let solid = || world.bodies.iter().enumerate().filter(|(_, body)| is_solid(body, height));
         let (mut movers, mut loose, mut fastest_body) = (Vec::new(), Vec::new(), 0.0_f64);
         for (body, Body { footprint, motion, .. }) in solid() {
-            let round = Round { body, radius: bounding_radius(footprint) };
+            let round = Round { body, radius: footprint.bounding_radius() };
             match motion {
                 None => {}
                 Some(MotionSpec::Pushed { .. }) => loose.push(round),
@@ -139,8 +139,7 @@ impl Vicinity {
     /// Free space around the robot's hull, m.
     fn measure(&self, robot: Vector2<f64>, poses: &[Pose]) -> f64 {
         let walls = self.walls.iter().map(|(a, b)| distance_to_segment(robot, *a, *b));
-        let bodies =
-            self.bodies.iter().map(|(k, footprint)| distance_to_footprint(footprint, poses[*k].inverse_transform(robot)));
+        let bodies = self.bodies.iter().map(|(k, footprint)| footprint.distance_to(poses[*k].inverse_transform(robot)));
         walls.chain(bodies).fold(f64::INFINITY, f64::min) - self.robot_radius
     }
 }

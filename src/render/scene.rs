@@ -7,12 +7,12 @@ use bytemuck::{Pod, Zeroable};
 use rayon::prelude::*;
 
 use super::huge_pages;
-use super::texture;
+use super::texture::{self, Surface};
 use crate::error::Result;
 use crate::geometry::Vector2;
 use crate::panorama::INSTANCE_FIRST_WALL;
 use crate::world::spec::{LampSpec, LightFactors};
-use crate::world::{Body, Footprint, LightPreset, Pattern, Texture, Window, World};
+use crate::world::{Body, Footprint, LightPreset, Window, World};
 
 /// Most levels of a texture.
 pub(super) const LEVELS: usize = texture::FINEST as usize + 1;
@@ -228,21 +228,6 @@ fn panes(window: &Window) -> impl Iterator<Item = Pane> {
             brightness,
         }
     })
-}
-
-/// A texture as a surface shows it.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Surface<'a> {
-    pub texture: &'a Texture,
-    /// Whether u runs from right to left for who looks at it.
-    pub mirrored: bool,
-}
-
-impl<'a> Surface<'a> {
-    pub fn new(texture: &'a Texture, mirrored: bool) -> Self {
-        // Patterns have no right way round: they are shared.
-        Self { texture, mirrored: mirrored && matches!(texture.pattern, Pattern::Image(_)) }
-    }
 }
 
 /// Texels after the last texture, for vectors that read beyond a line that they need a part of.

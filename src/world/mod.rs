@@ -70,6 +70,27 @@ pub enum Footprint {
     Polygon(Vec<Vector2<f64>>),
 }
 
+impl Footprint {
+    /// Distance from `point`, given in the footprint's frame, to the footprint, m; zero inside.
+    #[must_use]
+    pub fn distance_to(&self, point: Vector2<f64>) -> f64 {
+        match self {
+            Self::Disc(radius) => (point.norm() - radius).max(0.0),
+            Self::Polygon(corners) if polygon::contains(corners, point) => 0.0,
+            Self::Polygon(corners) => polygon::distance_to_boundary(corners, point),
+        }
+    }
+
+    /// Radius of the circle around the footprint's origin that holds all of it, m.
+    #[must_use]
+    pub fn bounding_radius(&self) -> f64 {
+        match self {
+            Self::Disc(radius) => *radius,
+            Self::Polygon(corners) => corners.iter().map(Vector2::norm).fold(0.0, f64::max),
+        }
+    }
+}
+
 /// A body of a checked world.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Body {

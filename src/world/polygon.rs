@@ -53,14 +53,19 @@ pub fn contains(polygon: &[Vector2<f64>], point: Vector2<f64>) -> bool {
     inside
 }
 
+/// The point of the segment from `a` to `b` that is closest to `point`, and its share of the way from `a`, 0 to 1.
+#[must_use]
+pub fn closest_on_segment(point: Vector2<f64>, a: Vector2<f64>, b: Vector2<f64>) -> (Vector2<f64>, f64) {
+    let along = b - a;
+    let length_squared = along.norm_squared();
+    let t = if length_squared > 0.0 { ((point - a).dot(&along) / length_squared).clamp(0.0, 1.0) } else { 0.0 };
+    (a + along * t, t)
+}
+
 /// Distance from `point` to the segment from `a` to `b`, m.
 #[must_use]
 pub fn distance_to_segment(point: Vector2<f64>, a: Vector2<f64>, b: Vector2<f64>) -> f64 {
-    let along = b - a;
-    let length_squared = along.dot(&along);
-    let t = if length_squared > 0.0 { ((point - a).dot(&along) / length_squared).clamp(0.0, 1.0) } else { 0.0 };
-    let d = point - (a + along * t);
-    d.dot(&d).sqrt()
+    (point - closest_on_segment(point, a, b).0).norm()
 }
 
 /// Distance from `point` to the nearest edge, m, whether it lies inside or outside.
@@ -118,14 +123,25 @@ pub fn self_intersection(polygon: &[Vector2<f64>]) -> Option<(usize, usize)> {
     None
 }
 
+/// On which sides of the line from `a` to `b` lie c and d, and of the line from `c` to `d` a and b: positive to the left.
+fn sides(a: Vector2<f64>, b: Vector2<f64>, c: Vector2<f64>, d: Vector2<f64>) -> [f64; 4] {
+    [cross(b - a, c - a), cross(b - a, d - a), cross(d - c, a - c), cross(d - c, b - c)]
+}
+
+/// Whether the segments a-b and c-d cross at a point inside both.
+#[must_use]
+pub fn segments_cross(a: Vector2<f64>, b: Vector2<f64>, c: Vector2<f64>, d: Vector2<f64>) -> bool {
+    let [c_side, d_side, a_side, b_side] = sides(a, b, c, d);
+    c_side * d_side < 0.0 && a_side * b_side < 0.0
+}
+
 /// Whether two closed segments have a point in common.
 fn segments_meet(a: Vector2<f64>, b: Vector2<f64>, c: Vector2<f64>, d: Vector2<f64>) -> bool {
-    let side = |p: Vector2<f64>, q: Vector2<f64>, r: Vector2<f64>| cross(q - p, r - p);
     let in_box = |p: Vector2<f64>, q: Vector2<f64>, r: Vector2<f64>| {
         r.x >= p.x.min(q.x) && r.x <= p.x.max(q.x) && r.y >= p.y.min(q.y) && r.y <= p.y.max(q.y)
     };
-    let (c_side, d_side, a_side, b_side) = (side(a, b, c), side(a, b, d), side(c, d, a), side(c, d, b));
-    (c_side * d_side < 0.0 && a_side * b_side < 0.0)
+    let [c_side, d_side, a_side, b_side] = sides(a, b, c, d);
+    segments_cross(a, b, c, d)
         || (c_side == 0.0 && in_box(a, b, c))
         || (d_side == 0.0 && in_box(a, b, d))
         || (a_side == 0.0 && in_box(c, d, a))
@@ -165,6 +181,9 @@ mod tests {
         // Level with a corner and an edge: the ray through them must count them once.
         assert!(contains(&ell(), Vector2::new(0.5, 1.0)) && !contains(&ell(), Vector2::new(-0.5, 1.0)));
         assert!((distance_to_boundary(&ell(), Vector2::new(1.5, 1.4)) - 0.4).abs() < 1e-15);
+        let diagonal = [Vector2::new(0.1, 0.1), Vector2::new(1.9, 1.9)];
+        assert!(segments_cross(diagonal[0], diagonal[1], ell()[1], ell()[5]));
+        assert!(!segments_cross(ell()[0], ell()[1], ell()[1], ell()[2]), "they meet at an end");
     }
 
     #[test]

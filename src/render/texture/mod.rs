@@ -17,9 +17,23 @@ use std::collections::VecDeque;
 
 use canvas::Canvas;
 
-use super::scene::Surface;
 use crate::random::Seed;
 use crate::world::{Pattern, Texture, TextureFamily};
+
+/// A texture as a surface shows it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Surface<'a> {
+    pub texture: &'a Texture,
+    /// Whether u runs from right to left for who looks at it.
+    pub mirrored: bool,
+}
+
+impl<'a> Surface<'a> {
+    pub fn new(texture: &'a Texture, mirrored: bool) -> Self {
+        // Patterns have no right way round: they are shared.
+        Self { texture, mirrored: mirrored && matches!(texture.pattern, Pattern::Image(_)) }
+    }
+}
 
 /// What a baked texture consists of.
 pub(super) struct Baked {
