@@ -11,6 +11,7 @@ use wayhome::episode::PoseRecord;
 use wayhome::panorama::Projection;
 use wayhome::storage::{OutputFolder, write_atomically};
 use wayhome::verify::vision::conditions::Axis;
+use wayhome::verify::vision::outside;
 use wayhome::verify::vision::page as report;
 use wayhome::verify::vision::{Pair, VisionSettings, VisionStudy, cells, run as run_study};
 use wayhome::vision::ExtractorSettings;
@@ -57,7 +58,7 @@ pub fn run(args: &VisionReportArgs, context: &Context) -> Result<Verdict> {
         claim(pairs)?;
     }
     // What other detectors made of the same pairs is kept and shown.
-    let outside = std::fs::read_to_string(args.out.join(report::OUTSIDE)).ok();
+    let outside = std::fs::read_to_string(args.out.join(outside::FILE)).ok();
     let bar = context.progress(Some((worlds.len() * cells(&settings)) as u64))?;
     bar.tick();
     let mut records = Vec::new();

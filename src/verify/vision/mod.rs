@@ -4,7 +4,7 @@
 //! a time is changed: distance, turn, light, noise, camera, what stands in between. The truth scores; the extractor sees colours only.
 
 pub mod conditions;
-mod outside;
+pub mod outside;
 pub mod page;
 pub mod score;
 

@@ -2,11 +2,13 @@
 
 use std::fmt::Write;
 
-use super::page::OUTSIDE;
 use crate::draw::chart::{Axis as ChartAxis, Chart, Mark, Stroke};
 use crate::error::{Error, Result};
 use crate::verify::vision::VisionStudy;
 use crate::verify::vision::conditions::Axis;
+
+/// Name of the table, which the page keeps as it is.
+pub const FILE: &str = "opencv.csv";
 
 /// First line of the table.
 const HEADER: &str = "world,distance_m,method,keypoints,panoramas,matches,right,extract_ms,match_ms";
@@ -35,7 +37,7 @@ impl Outside {
     /// When it is not what the script writes; the message names the line.
     pub fn parse(text: &str) -> Result<Self> {
         let fault = |line: usize, expected: &str| Error::Parse {
-            path: OUTSIDE.into(),
+            path: FILE.into(),
             message: format!("line {line}: expected {expected}, as tests/outside/opencv_features.py writes it"),
         };
         let mut lines = text.lines().zip(1..);

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use super::outside::Outside;
+use super::outside::{FILE as OUTSIDE, Outside};
 use crate::draw::chart::{Axis as ChartAxis, Chart, Mark, Stroke};
 use crate::error::Result;
 use crate::storage::OutputFolder;
@@ -26,9 +26,6 @@ pub const FILES: &[&str] = &[
     OUTSIDE,
     "opencv.svg",
 ];
-
-/// What OpenCV makes of the same pairs, written by `tests/outside/opencv_features.py`.
-pub const OUTSIDE: &str = "opencv.csv";
 
 /// Writes the page that `command` has made. `outside` is the text of [`OUTSIDE`] where the folder has one.
 ///
