@@ -4,6 +4,8 @@
 //! elevation (a cylinder) or in elevation itself (equal angles), see [`ProjectionKind`]. Column 0 looks along the robot's heading plus the camera's mounting offset; azimuth grows
 //! anti-clockwise with the column. Row 0 is the top.
 
+mod shot;
+
 use std::f64::consts::TAU;
 
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
@@ -13,6 +15,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Result};
 use crate::geometry::{atan2, sin_cos, wrap};
+pub use shot::{Appearance, Shot};
 
 /// Instance id of the floor.
 pub const INSTANCE_FLOOR: u16 = 1;

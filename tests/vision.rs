@@ -9,9 +9,9 @@ use std::sync::LazyLock;
 use wayhome::episode::{Bench, Outcome, Setup};
 use wayhome::geometry::{Pose, direction, wrap};
 use wayhome::observation::Bearing;
-use wayhome::panorama::{Panorama, Projection};
+use wayhome::panorama::{Panorama, Projection, Shot};
 use wayhome::render::{self, RendererChoice, Scene, View};
-use wayhome::verify::vision::score::{Score, Shot, Spread};
+use wayhome::verify::vision::score::{Score, Spread};
 use wayhome::vision::{Extractor, ExtractorSettings, Landmarks};
 use wayhome::world::World;
 

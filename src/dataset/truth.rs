@@ -2,10 +2,9 @@
 
 use crate::error::{Error, Result};
 use crate::geometry::{Pose, Vector2, angle_of, cross, direction};
-use crate::panorama::{Panorama, Projection};
+use crate::panorama::{Panorama, Projection, Shot};
 use crate::panorama_set::{Frame, FrameTruth, LandmarkTruth};
 use crate::table::Table;
-use crate::verify::vision::score::Shot;
 use crate::vision::{Extractor, ExtractorSettings};
 use crate::world::polygon::edges;
 use crate::world::{Body, Footprint, World};

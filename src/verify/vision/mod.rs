@@ -18,14 +18,14 @@ use serde::Serialize;
 use crate::error::{Error, Result};
 use crate::geometry::{Pose, Twist, direction};
 use crate::observation::HomeSnapshot;
-use crate::panorama::Panorama;
+use crate::panorama::{Panorama, Shot};
 use crate::physics::{Plant, RapierPlant};
 use crate::random::Seed;
 use crate::render::{Camera, CpuRenderer, Scene, View};
 use crate::vision::{Extractor, ExtractorSettings, Landmarks};
 use crate::world::World;
 use conditions::{Axis, Condition};
-use score::{Score, Shot, Spread};
+use score::{Score, Spread};
 
 /// Directions from home in which panoramas are taken, where the robot can stand there.
 const DIRECTIONS: usize = 16;
