@@ -3,4 +3,5 @@
 pub mod chart;
 pub mod image;
 pub mod map;
+pub mod markdown;
 pub mod sheet;
