@@ -38,7 +38,7 @@ struct Params {
     first_body: u32,
     first_lamp: u32,
     all_bits: u32,
-    padding: u32,
+    first_look: u32,
 }
 
 struct Row {
@@ -68,7 +68,7 @@ struct Body {
     glow: f32,
 }
 
-// Parameters, edges, bodies and lamps, one table after the other, 16 bytes a texel.
+// Parameters, edges, bodies, lamps and looks, one table after the other, 16 bytes a texel.
 @group(0) @binding(0) var tables: texture_storage_2d<rgba32uint, read>;
 @group(0) @binding(1) var<storage, read> directions: array<vec2<f32>>;
 @group(0) @binding(2) var<uniform> rows: array<Row, MAX_ROWS>;
@@ -105,6 +105,11 @@ fn load_params() {
     );
 }
 
+// What a surface of this view is: number of its material in the lower half, instance id in the upper one.
+fn look_of(surface: u32) -> u32 {
+    return table_words(params.first_look + (surface >> 2u))[surface & 3u];
+}
+
 fn edge_at(k: u32) -> Edge {
     let first = table_numbers(params.first_edge + 2u * k);
     let second = table_numbers(params.first_edge + 2u * k + 1u);
@@ -122,7 +127,6 @@ fn body_at(k: u32) -> Body {
 struct Hit {
     near: f32,
     far: f32,
-    bottom: f32,
     normal: vec2<f32>,
     u: f32,
     surface: u32,
@@ -136,7 +140,7 @@ var<private> hit_surface: array<u32, MAX_HITS>;
 var<private> hit_count: u32;
 
 fn none() -> Hit {
-    return Hit(FAR, FAR, -FAR, vec2<f32>(0.0), 0.0, 0u);
+    return Hit(FAR, FAR, vec2<f32>(0.0), 0.0, 0u);
 }
 
 // A hit whose near is FAR is no hit.
@@ -169,7 +173,6 @@ fn hit_body(k: u32, direction: vec2<f32>) -> Hit {
         return none();
     }
     hit.near = max(hit.near, 0.0);
-    hit.bottom = body.bottom;
     hit.surface = 2u + params.wall_count + k;
     return hit;
 }

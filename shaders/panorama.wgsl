@@ -18,7 +18,7 @@ fn show(row: u32, column: u32, colour: u32, code: u32) {
 fn show_hits(column: u32) {
     var place = params.width * params.height + column * 3u * MAX_HITS;
     for (var k = 0u; k < hit_count; k++) {
-        picture[place] = hit_surface[k] + 1u;
+        picture[place] = look_of(hit_surface[k]) >> 16u;
         picture[place + 1u] = bitcast<u32>(hit_near[k]);
         picture[place + 2u] = bitcast<u32>(cap_height[k]);
         place += 3u;

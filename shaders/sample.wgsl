@@ -3,7 +3,7 @@
 const ROUNDER: f32 = 12582912.0;
 // -0.082 in units of the logarithm.
 const ROUNDING: i32 = -687865;
-// Words of a surface in the table of materials, two a texel.
+// Words of a material in its table, two a texel.
 const MATERIAL_TEXELS: u32 = 47u;
 
 // A level of a texture, with a border of one texel, cut into tiles of 32 x 32 texels, u by v.
@@ -21,9 +21,11 @@ struct Material {
     finest: f32,
     // Where its levels are.
     levels: u32,
+    // Height from which v is counted on an upright surface, m.
+    foot: f32,
 }
 
-// Per surface tiles per metre, number of the last level and a word of padding, and the levels.
+// Per material tiles per metre, number of the last level, the foot, and the levels.
 @group(0) @binding(3) var materials: texture_storage_2d<rg32uint, read>;
 // Columns of tiles, one beside the other: what is near one another in a texture lies on few pages of memory. Each texel comes
 // with the next one along v, since no sample needs one alone.
@@ -34,9 +36,10 @@ fn material_words(k: u32) -> vec2<u32> {
 }
 
 fn material_at(surface: u32) -> Material {
-    let first = MATERIAL_TEXELS * surface;
+    let first = MATERIAL_TEXELS * (look_of(surface) & 0xffffu);
     let tiles_per_m = bitcast<vec2<f32>>(material_words(first));
-    return Material(tiles_per_m, material_words(first + 1u).x, f32(material_words(first + 2u).y), first + 2u);
+    let words = material_words(first + 1u);
+    return Material(tiles_per_m, words.x, f32(material_words(first + 2u).y), first + 2u, bitcast<f32>(words.y));
 }
 
 // A line of texels along v.

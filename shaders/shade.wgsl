@@ -94,7 +94,7 @@ fn new_side(hit: Hit, direction: vec2<f32>) -> Side {
     let cosine = -dot(hit.normal, direction);
     let across = hit.near * params.pixel_rad;
     let slant = across / max(cosine, LEAST_COSINE);
-    let foot = max(hit.bottom, 0.0);
+    let foot = material.foot;
     let detail = level(material, strip_footprint(material.tiles_per_m, vec2<f32>(slant, across)));
     let v = params.camera_height + hit.near * rows[0u].tan - foot;
     let strip = new_strip(material.tiles_per_m, hit.u, v, across, detail);

@@ -266,3 +266,47 @@ fn moving_bodies_drag_the_robot_and_push_cartons() {
     assert!((carton.position() - Vector2::new(0.0, 2.0)).norm() > 0.3, "{carton:?}");
     assert_eq!(plant.truth().position(), Vector2::new(0.0, -2.0));
 }
+
+/// A wall from y = -3 to y = 3 at x = 1 with an opening around y = 0, 0.6 m wide.
+fn wall_with(opening: &str) -> World {
+    world(0.75, &format!("[[walls]]\nname = \"partition\"\nfrom_m = [1.0, -3.0]\nto_m = [1.0, 3.0]\nopenings = [{opening}]\n"))
+}
+
+#[test]
+fn a_robot_passes_a_door_that_is_high_enough_and_nothing_else_of_a_wall() {
+    let at = "from_start_m = 2.7, width_m = 0.6";
+    let doors = [
+        (format!("{{ kind = \"door\", {at} }}"), true),
+        (format!("{{ {at}, top_m = 2.5 }}"), true),
+        (format!("{{ {at}, sill_m = 0.02 }}"), false),
+        (format!("{{ kind = \"window\", {at} }}"), false),
+        (format!("{{ {at}, top_m = 0.2 }}"), false),
+    ];
+    for (opening, passes) in doors {
+        let world = wall_with(&opening);
+        for always_rapier in [false, true] {
+            let start = Pose::new(0.0, 0.0, 0.0);
+            let mut plant = RapierPlant::new(&world, start, Seed(1));
+            if always_rapier {
+                plant = plant.always_asking_rapier();
+            }
+            let mut hits = Vec::new();
+            for _ in 0..80 {
+                plant.step(Twist { v: 0.3, omega: 0.0 }, 0.1);
+                hits.extend(plant.collisions().iter().map(|hit| hit.with.name(&world)));
+            }
+            let radius = world.spec.robot.radius_m;
+            if passes {
+                assert!(plant.truth().x > 1.9 && hits.is_empty(), "{opening}: {:?}, {hits:?}", plant.truth());
+            } else {
+                assert_eq!(hits, ["partition"], "{opening}");
+                assert!((plant.truth().x - (0.95 - radius)).abs() < 2e-3, "{opening}: {:?}", plant.truth());
+            }
+        }
+        let free = |y: f64| world.is_free(&Pose::new(1.0, y, 0.0), 0.0, &[]);
+        assert_eq!(free(0.0).is_ok(), passes, "{opening}");
+        assert_eq!(free(0.2), Err("partition".to_owned()), "{opening}: a jamb is in the way");
+        let corridor = world.is_corridor_free(Vector2::new(0.0, 0.0), Vector2::new(2.0, 0.0));
+        assert_eq!(corridor.is_ok(), passes, "{opening}");
+    }
+}

@@ -77,7 +77,13 @@ impl Shapes {
         };
         let window =
             |w: &Window| (polygon(&w.footprint), ParryPose::identity(), w.instance, [w.bottom_m as f32, w.top_m as f32]);
-        let bodies = world.bodies.iter().zip(poses).map(body).chain(world.windows.iter().map(window)).collect();
+        let pieces = world.partitions.iter().flat_map(|w| w.pieces.iter().map(move |piece| (w, piece)));
+        let pieces = pieces.map(|(w, piece)| {
+            let heights = [piece.bottom_m as f32, piece.top_m as f32];
+            (polygon(&w.footprint(piece.along_m)), ParryPose::identity(), w.instance, heights)
+        });
+        let bodies = world.bodies.iter().zip(poses).map(body).chain(world.windows.iter().map(window));
+        let bodies = bodies.chain(pieces).collect();
         Self { walls, bodies }
     }
 
@@ -130,7 +136,7 @@ fn every_pixel_sees_what_parrys_rays_meet() {
     let built_in = World::builtin_names().into_iter().map(|name| World::open(name).unwrap());
     let mut stream = Seed(4).stream("poses");
     let (mut pixels, mut at_outlines) = (0, 0);
-    for world in built_in.chain([world(HALL), world(STACK)]) {
+    for world in built_in.chain([world(HALL), world(STACK), world(include_str!("support/flat.toml"))]) {
         // What can move has moved.
         let moved = |b: &Body| {
             if b.motion.is_some() { Pose::new(b.pose.x + 0.1, b.pose.y - 0.2, b.pose.heading + 0.7) } else { b.pose }
@@ -206,6 +212,37 @@ fn low_stacked_and_hanging_boxes_are_seen_as_they_stand() {
     }
     let seen = |instance| (0..projection.height).any(|r| picture.instance[(r * projection.width) as usize] == instance);
     assert!([table, case, lintel, world.wall_instance(1)].into_iter().all(seen), "the rows cover all cases");
+}
+
+/// The texture of a wall inside the room runs on where there are openings, and its sides differ.
+#[test]
+fn openings_do_not_shift_the_texture_of_their_wall() {
+    let room = |openings: &str| {
+        let text = "name = \"walls\"\nhome = { x_m = 2, y_m = 2 }\ncamera = { height_m = 1.2, horizon = 0.5 }\n[room]\n\
+            outline_m = [[0, 0], [8, 0], [8, 4], [0, 4]]\n[[walls]]\nfrom_m = [4, 0]\nto_m = [4, 4]\n\
+            texture = { family = \"posters\" }\nopenings = [";
+        world(&format!("{text}{openings}]"))
+    };
+    let pierced =
+        "{ kind = \"door\", from_start_m = 0.5, width_m = 0.8 }, { kind = \"window\", from_start_m = 2, width_m = 1 }";
+    let (whole, pierced) = (room(""), room(pierced));
+    let projection = Projection::new(1440, 300);
+    let wall = whole.partitions[0].instance;
+    for robot in [Pose::new(2.2, 1.9, 0.0), Pose::new(6.1, 2.1, 3.0)] {
+        let (a, b) = (render(&whole, projection, robot), render(&pierced, projection, robot));
+        let of_both: Vec<usize> = (0..projection.pixels())
+            .filter(|&k| a.instance[k] == wall && b.instance[k] == wall && a.range_m[k] == b.range_m[k])
+            .collect();
+        let all = a.instance.iter().filter(|id| **id == wall).count();
+        assert!(of_both.len() > all / 2 && of_both.len() < all * 9 / 10, "{} of {all}", of_both.len());
+        let same = of_both.iter().filter(|&&k| a.rgba[4 * k..4 * k + 4] == b.rgba[4 * k..4 * k + 4]).count();
+        assert!(same * 1000 > of_both.len() * 999, "{same} of {}", of_both.len());
+    }
+    let inside = Pose::new(4.0, 3.7, 0.0);
+    let (scene, bodies) = (Scene::new(&pierced).unwrap(), pierced.body_poses());
+    let view = View { projection, robot: inside, bodies: &bodies };
+    let refused = CpuRenderer::new().render(&scene, &view, &mut Panorama::empty()).unwrap_err().to_string();
+    assert!(refused.contains("inside `inner wall 0`"), "{refused}");
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! The GPU renderer against its CPU twin: all built-in worlds and two more, under all lights and through all cameras but for
+//! The GPU renderer against its CPU twin: all built-in worlds and four more, under all lights and through all cameras but for
 //! their noise, from random poses.
 //!
 //! Where there is no adapter this says loudly that it did not run, and fails if `WAYHOME_REQUIRE_GPU` is 1. A comparison that
@@ -199,7 +199,8 @@ fn gpu_and_cpu_agree() {
     let (mut worst, mut total, mut pictures) = ((0.0_f64, 0.0_f64), (0.0, 0.0), 0.0);
     let (mut bytes, mut unequal) = (0, 0);
     let builtin = World::builtin_names().into_iter().map(|name| World::open(name).unwrap());
-    for world in builtin.chain([text(CELLAR), text(&forest()), text(&queue())]) {
+    let flat = text(include_str!("support/flat.toml"));
+    for world in builtin.chain([text(CELLAR), text(&forest()), text(&queue()), flat]) {
         let name = world.spec.name.clone();
         let scene = Scene::new(&world).unwrap();
         for k in 0..LightPreset::ALL.len() * CameraPreset::ALL.len() {

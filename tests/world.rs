@@ -51,6 +51,15 @@ position_m = [0.4, 1.5]
 height_m = 0.3
 texture = { family = "plain" }
 motion = { walk = { region_m = [[0.2, 1.2], [0.6, 1.2], [0.6, 1.8], [0.2, 1.8]], speed_m_s = 0.4 } }
+[[walls]]
+name = "stub"
+from_m = [2.2, 2.5]
+to_m = [2.2, 3.0]
+[[walls]]
+from_m = [2.9, 2.55]
+to_m = [2.9, 3.0]
+height_m = 1.2
+openings = [{ kind = "window", from_start_m = 0.05, width_m = 0.15, sill_m = 0.5, top_m = 1.0 }, { from_start_m = 0.25, width_m = 0.1, top_m = 0.9 }]
 [robot]
 caster_m = 0.125
 [camera]
@@ -121,6 +130,23 @@ const SPOILT: &[(&str, &str, &str, &str)] = &[
         "light.windows[0].height_m",
         "[2, 1]",
     ),
+    // Walls.
+    ("to_m = [2.2, 3.0]", "to_m = [2.2, 2.5]", "walls[0].to_m", "0 m from the wall's beginning"),
+    ("to_m = [2.2, 3.0]", "to_m = [2.2, 3.1]", "walls[0].to_m", "leaves the room"),
+    ("to_m = [2.2, 3.0]", "to_m = [2.2, 3.0]\nthickness_m = 2.5", "walls[0].thickness_m", "2.5"),
+    ("name = \"stub\"", "name = \"post\"", "walls[0].name", "the name of landmarks[0]"),
+    ("height_m = 1.2", "height_m = 2.7", "walls[1].height_m", "2.7"),
+    ("width_m = 0.15", "width_m = 0.5", "walls[1].openings[0].width_m", "0.5"),
+    ("width_m = 0.1,", "width_m = 0.4,", "walls[1].openings[1].width_m", "ends 0.65 m along the wall"),
+    ("from_start_m = 0.25", "from_start_m = 0.15", "walls[1].openings[1].from_start_m", "where opening 0 is"),
+    ("sill_m = 0.5", "sill_m = 1.0", "walls[1].openings[0].sill_m", "1"),
+    ("kind = \"window\"", "kind = \"door\"", "walls[1].openings[0].sill_m", "0.5"),
+    ("kind = \"window\"", "kind = \"hatch\"", "walls[1].openings[0].kind", "\"hatch\""),
+    ("top_m = 1.0", "top_m = 1.3", "walls[1].openings[0].top_m", "1.3"),
+    ("top_m = 0.9", "top_m = 0.38", "walls[1].openings[1].top_m", "0.38"),
+    ("from_m = [2.2, 2.5]", "from_m = [2.1, 1.5]", "home", "in stub"),
+    ("position_m = [3.5, 2.5]", "position_m = [2.75, 2.7]", "landmarks[0].position_m", "deep in \"inner wall 1\""),
+    ("from_m = [2.2, 2.5]", "from_m = [1.6, 0.2]", "obstacles[1].motion.path.corners_m[0]", "runs into \"stub\""),
     // Bodies.
     ("radius_m = 0.2", "radius_m = 0.0", "landmarks[0].shape.disc.radius_m", "0"),
     ("size_m = [1.0, 0.5]", "size_m = [1.0, -0.5]", "landmarks[1].shape.box.size_m[1]", "-0.5"),

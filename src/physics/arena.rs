@@ -12,7 +12,7 @@ use super::chassis::PlanarVelocity;
 use super::hull::{HULL_FRICTION, HULL_RESTITUTION};
 use super::movers::is_solid;
 use super::slide::SlidingBody;
-use super::{Struck, Touched};
+use super::{Struck, Touched, solid_stretches};
 use crate::geometry::{Pose, Vector2, atan2, sin_cos};
 use crate::world::polygon::{contains, edges, segments_cross};
 use crate::world::{Footprint, MotionSpec, World};
@@ -77,6 +77,10 @@ impl Arena {
         for (k, [a, b, apex]) in walls(&world.outline).enumerate() {
             let wall = hard(ColliderBuilder::triangle(vector(a), vector(b), vector(apex)));
             physics.insert_collider(wall.user_data(mark(Struck::Wall(k))), None);
+        }
+        for (k, corners) in solid_stretches(world) {
+            let wall = hard(shape(&Footprint::Polygon(corners.to_vec())));
+            physics.insert_collider(wall.user_data(mark(Struck::Partition(k))), None);
         }
         let robot_spec = &world.spec.robot;
         let mut movers = Vec::new();
@@ -210,18 +214,23 @@ fn impulse(pair: &ContactPair) -> f64 {
     (normal * normal + along * along).sqrt()
 }
 
-/// What a collider stands for, as the number that rapier carries for us: walls are even, bodies odd.
+/// What a collider stands for, as the number that rapier carries for us: three kinds by turns.
 fn mark(struck: Struck) -> u128 {
     match struck {
-        Struck::Wall(k) => 2 * k as u128,
-        Struck::Body(k) => 2 * k as u128 + 1,
+        Struck::Wall(k) => 3 * k as u128,
+        Struck::Body(k) => 3 * k as u128 + 1,
+        Struck::Partition(k) => 3 * k as u128 + 2,
     }
 }
 
 /// The inverse of [`mark`].
 fn struck(mark: u128) -> Struck {
-    let k = (mark / 2) as usize;
-    if mark.is_multiple_of(2) { Struck::Wall(k) } else { Struck::Body(k) }
+    let k = (mark / 3) as usize;
+    match mark % 3 {
+        0 => Struck::Wall(k),
+        1 => Struck::Body(k),
+        _ => Struck::Partition(k),
+    }
 }
 
 /// Solid walls: a triangle behind each edge of the room, its apex outside. Triangles have no overhang, so with an apex close

@@ -14,7 +14,7 @@
 
 use super::chassis::{Chassis, PlanarVelocity};
 use super::movers::is_solid;
-use super::{Struck, TOUCH_GAP_M, Touched};
+use super::{Struck, TOUCH_GAP_M, Touched, solid_stretches};
 use crate::geometry::{Pose, Vector2, cross};
 use crate::world::polygon::{closest_on_segment, contains, edges};
 use crate::world::{Footprint, World};
@@ -41,6 +41,8 @@ pub(super) struct Hull {
     juts: Vec<bool>,
     /// Index in the world, footprint, and a circle around its origin that holds it.
     bodies: Vec<(usize, Footprint, f64)>,
+    /// What is solid of the walls inside the room: number of the wall and corners.
+    partitions: Vec<(usize, [Vector2<f64>; 4])>,
 }
 
 /// A place where the hull touches, or may within the substep.
@@ -69,6 +71,7 @@ impl Hull {
             juts: jutting(&world.outline),
             outline: world.outline.clone(),
             bodies: bodies.map(|(k, b)| (k, b.footprint.clone(), b.footprint.bounding_radius())).collect(),
+            partitions: solid_stretches(world).collect(),
         }
     }
 
@@ -126,7 +129,10 @@ impl Hull {
             let (normal, distance) = footprint_at(footprint, before[*k].inverse_transform(centre));
             contact(Struck::Body(*k), surface, (before[*k].transform(normal) - before[*k].position(), distance))
         });
-        walls.chain(bodies).collect()
+        let partitions = self.partitions.iter();
+        let partitions =
+            partitions.filter_map(|(k, corners)| contact(Struck::Partition(*k), Vector2::zeros(), polygon_at(corners, centre)));
+        walls.chain(bodies).chain(partitions).collect()
     }
 
     /// Normal and distance of `point` from each wall that faces it. Outside the room, where only a bad start can put the robot,
@@ -204,18 +210,21 @@ fn footprint_at(footprint: &Footprint, point: Vector2<f64>) -> (Vector2<f64>, f6
             let distance = point.norm();
             (if distance > 0.0 { point / distance } else { Vector2::x() }, distance - radius)
         }
-        Footprint::Polygon(corners) => {
-            let inside = contains(corners, point);
-            let nearest = edges(corners).map(|(a, b)| {
-                let away = point - closest_on_segment(point, a, b).0;
-                let distance = away.norm();
-                let outwards = -quarter_turn(b - a) / (b - a).norm();
-                if inside || distance == 0.0 { (outwards, distance) } else { (away / distance, distance) }
-            });
-            let (normal, distance) = nearest.min_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((Vector2::x(), f64::INFINITY));
-            (normal, if inside { -distance } else { distance })
-        }
+        Footprint::Polygon(corners) => polygon_at(corners, point),
     }
+}
+
+/// The same for a convex polygon, corners anti-clockwise.
+fn polygon_at(corners: &[Vector2<f64>], point: Vector2<f64>) -> (Vector2<f64>, f64) {
+    let inside = contains(corners, point);
+    let nearest = edges(corners).map(|(a, b)| {
+        let away = point - closest_on_segment(point, a, b).0;
+        let distance = away.norm();
+        let outwards = -quarter_turn(b - a) / (b - a).norm();
+        if inside || distance == 0.0 { (outwards, distance) } else { (away / distance, distance) }
+    });
+    let (normal, distance) = nearest.min_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((Vector2::x(), f64::INFINITY));
+    (normal, if inside { -distance } else { distance })
 }
 
 /// `v` turned by 90 degrees anti-clockwise.

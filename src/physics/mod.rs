@@ -36,9 +36,9 @@ mod slide;
 mod unicycle;
 mod vicinity;
 
-use crate::geometry::{Pose, Twist};
+use crate::geometry::{Pose, Twist, Vector2};
 use crate::observation::Odometry;
-use crate::world::World;
+use crate::world::{Partition, World};
 
 pub use chassis::{Chassis, PlanarVelocity, STANDARD_GRAVITY_M_S2};
 pub use motor::WheelDrive;
@@ -65,15 +65,18 @@ pub enum Struck {
     Wall(usize),
     /// The body with this index in `World::bodies`.
     Body(usize),
+    /// The wall inside the room with this index in `World::partitions`.
+    Partition(usize),
 }
 
 impl Struck {
-    /// Its name in `world`: `wall 2`, `desk`.
+    /// Its name in `world`: `wall 2`, `desk`, `inner wall 0`.
     #[must_use]
     pub fn name(self, world: &World) -> String {
         match self {
             Self::Wall(k) => format!("wall {k}"),
             Self::Body(k) => world.bodies.get(k).map_or_else(|| format!("body {k}"), |body| body.name.clone()),
+            Self::Partition(k) => world.partitions.get(k).map_or_else(|| format!("inner wall {k}"), |wall| wall.name.clone()),
         }
     }
 }
@@ -81,6 +84,16 @@ impl Struck {
 /// Gap up to which a contact once made counts as one, m: a robot that rattles along a wall runs into it once. Also the gap
 /// at which rapier foresees contacts.
 const TOUCH_GAP_M: f64 = 0.002;
+
+/// What a robot of a world cannot pass of its inner walls: a convex polygon in the room for each stretch, and the number of the wall.
+/// A door whose lintel is higher than the robot parts two stretches; a sill, however low, or a lower lintel does not.
+fn solid_stretches(world: &World) -> impl Iterator<Item = (usize, [Vector2<f64>; 4])> + '_ {
+    let height_m = world.spec.robot.height_m;
+    let of_wall = move |(k, wall): (usize, &'_ Partition)| -> Vec<_> {
+        wall.stretches(0.0, height_m).into_iter().map(|stretch| (k, wall.footprint(stretch))).collect()
+    };
+    world.partitions.iter().enumerate().flat_map(of_wall)
+}
 
 /// Something that the robot's hull touched in a substep, or came as close to as [`TOUCH_GAP_M`].
 #[derive(Debug, Clone, Copy)]

@@ -413,7 +413,7 @@ fn lay_out<'a>(band: &Band<'a>, desk: &mut Desk, rows: usize, column: usize, fir
             (Face::Underside, Some(hit)) => (hit.bottom - eye, Unit::InverseTan),
             (_, None) => (1.0, Unit::Plane),
         };
-        let shown = Shown { distance, unit, instance: (span.surface + 1) as u16 };
+        let shown = Shown { distance, unit, instance: frame.instance(span.surface) };
         let next = desk.first_change[start];
         desk.changes.push(Change { next, column: (column - first) as u16, shown });
         desk.first_change[start] = desk.changes.len() as u32;

@@ -5,6 +5,7 @@
 
 use bytemuck::{Pod, Zeroable};
 
+use super::inner::{Block, Face, look};
 use super::scene::Prism;
 use super::{Scene, View};
 use crate::error::{Error, Result};
@@ -125,14 +126,13 @@ pub(super) struct Params {
     pub ceiling_end: u32,
     /// ... and those that can meet the floor begin with this one.
     pub floor_start: u32,
-    /// Where the shader finds the first edge, body and lamp in its table, which begins with this; in units of 16 bytes.
+    /// Where the shader finds the first edge, body, lamp and look in its table, which begins with this; in units of 16 bytes.
     pub first_edge: u32,
     pub first_body: u32,
     pub first_lamp: u32,
     /// No word is greater than this; the shader's compiler must not know.
     pub all_bits: u32,
-    /// Fills up to a multiple of 16 bytes.
-    pub padding: u32,
+    pub first_look: u32,
 }
 
 /// All tables of one view. Kept by a renderer and refilled view by view without allocating.
@@ -142,9 +142,12 @@ pub(super) struct Frame {
     /// Unit vectors of the columns in the room's axes.
     pub directions: Vec<[f32; 2]>,
     pub rows: Vec<Row>,
-    /// First the walls, then the edges of polygonal bodies.
+    /// First the walls of the room, then those inside, then the edges of polygonal bodies.
     pub edges: Vec<Edge>,
     pub bodies: Vec<Body>,
+    /// For each surface of this view, [`look`]: floor, ceiling, walls and bodies in the order of `edges` and `bodies`; and what fills
+    /// up to a multiple of four.
+    pub looks: Vec<u32>,
     /// Lamps, then pieces of windows.
     pub lamps: Vec<Lamp>,
     /// How many are lamps.
@@ -167,6 +170,7 @@ impl Frame {
             rows: Vec::new(),
             edges: Vec::new(),
             bodies: Vec::new(),
+            looks: Vec::new(),
             lamps: Vec::new(),
             lamp_count: 0,
             circle: Vec::new(),
@@ -186,6 +190,14 @@ impl Frame {
         self.fill_rows(&projection, scene);
         self.edges.clear();
         push_edges(&mut self.edges, scene.outline.iter().map(|&p| p - camera), -1.0);
+        self.looks.clear();
+        let first_body = 2 + self.edges.len();
+        self.looks.extend((0..first_body).map(own_look));
+        for face in &scene.inner.faces {
+            self.edges.push(edge_of(face, camera));
+            self.looks.push(face.look);
+        }
+        let wall_count = self.edges.len() as u32;
         self.bodies.clear();
         for (prism, pose) in scene.bodies.iter().zip(view.bodies) {
             self.push_body(prism, scene.factors.lamps, pose, camera);
@@ -194,15 +206,21 @@ impl Frame {
         for pane in &scene.windows {
             self.push_body(pane, scene.factors.windows, &Pose::IDENTITY, camera);
         }
+        self.looks.extend((first_body..first_body + self.bodies.len()).map(own_look));
+        for block in &scene.inner.blocks {
+            self.push_block(block, camera);
+        }
+        self.looks.resize(self.looks.len().next_multiple_of(4), 0);
         self.fill_lamps(scene, camera);
         let texels = |bytes: usize| bytes.div_ceil(16) as u32;
         let first_edge = texels(size_of::<Params>());
         let first_body = first_edge + texels(size_of_val(self.edges.as_slice()));
         let first_lamp = first_body + texels(size_of_val(self.bodies.as_slice()));
+        let first_look = first_lamp + texels(size_of_val(self.lamps.as_slice()));
         self.params = Params {
             width: projection.width,
             height: projection.height,
-            wall_count: scene.outline.len() as u32,
+            wall_count,
             body_count: self.bodies.len() as u32,
             lamp_count: self.lamp_count as u32,
             rows_per_invocation: projection.height,
@@ -222,7 +240,7 @@ impl Frame {
             first_body,
             first_lamp,
             all_bits: u32::MAX,
-            padding: 0,
+            first_look,
         };
         Ok(())
     }
@@ -256,7 +274,7 @@ impl Frame {
         }
     }
 
-    /// Refuses a camera inside the solid of a body.
+    /// Refuses a camera inside the solid of a body or of a wall inside the room.
     fn refuse_inside(&self, scene: &Scene, camera: Vector2<f64>) -> Result<()> {
         let height = scene.camera_height_m as f32;
         let holds = |body: &Body| {
@@ -269,14 +287,16 @@ impl Frame {
             };
             within && body.bottom < height && height < body.top
         };
-        match self.bodies.iter().position(holds) {
+        let within_wall = |(_, corners, [bottom_m, top_m]): &&(String, [Vector2<f64>; 4], [f64; 2])| {
+            let inside = (0..4).all(|k| cross(corners[(k + 1) % 4] - corners[k], camera - corners[k]) > 0.0);
+            inside && *bottom_m < scene.camera_height_m && scene.camera_height_m < *top_m
+        };
+        let body = self.bodies.iter().position(holds).map(|k| &scene.bodies[k].name);
+        match body.or_else(|| scene.inner.solids.iter().find(within_wall).map(|(name, ..)| name)) {
             None => Ok(()),
-            Some(k) => Err(Error::CameraInside {
-                body: scene.bodies[k].name.clone(),
-                x_m: camera.x,
-                y_m: camera.y,
-                z_m: scene.camera_height_m,
-            }),
+            Some(name) => {
+                Err(Error::CameraInside { body: name.clone(), x_m: camera.x, y_m: camera.y, z_m: scene.camera_height_m })
+            }
         }
     }
 
@@ -337,6 +357,63 @@ impl Frame {
             padding: [0; 2],
         });
     }
+
+    /// Appends a piece of a wall inside the room.
+    fn push_block(&mut self, block: &Block, camera: Vector2<f64>) {
+        let first_edge = self.edges.len() as u32;
+        self.edges.extend(block.sides.iter().map(|side| edge_of(side, camera)));
+        let origin = block.origin - camera;
+        self.bodies.push(Body {
+            centre: [origin.x as f32, origin.y as f32],
+            heading: [block.along.x as f32, block.along.y as f32],
+            bottom: block.bottom_m as f32,
+            top: block.top_m as f32,
+            radius: 0.0,
+            first_edge,
+            edge_count: block.sides.len() as u32,
+            glow: 0.0,
+            padding: [0; 2],
+        });
+        self.looks.push(block.sides[0].look);
+    }
+
+    /// Number of a surface's material.
+    #[inline(always)]
+    pub fn material(&self, surface: u32) -> usize {
+        (self.looks[surface as usize] & 0xffff) as usize
+    }
+
+    /// Instance id of a surface; 0 of what is none.
+    #[inline(always)]
+    pub fn instance(&self, surface: u32) -> u16 {
+        self.looks.get(surface as usize).map_or(0, |look| (look >> 16) as u16)
+    }
+}
+
+/// The look of a surface that is numbered as its material and its instance are.
+fn own_look(surface: usize) -> u32 {
+    look(surface, surface as u16 + 1)
+}
+
+/// The edge of an upright face.
+fn edge_of(face: &Face, camera: Vector2<f64>) -> Edge {
+    Edge { u: face.u as f32, ..edge(face.a - camera, face.b - camera, 1.0).0 }
+}
+
+/// The edge from `a` to `b`, and its length, m. `side` is 1 where it is seen from the right, -1 from the left. u begins with 0.
+fn edge(a: Vector2<f64>, b: Vector2<f64>, side: f64) -> (Edge, f64) {
+    let length = ((b.x - a.x) * (b.x - a.x) + (b.y - a.y) * (b.y - a.y)).sqrt();
+    let tangent = (b - a) / length.max(1e-9);
+    let normal = Vector2::new(tangent.y, -tangent.x) * side;
+    let edge = Edge {
+        normal: [normal.x as f32, normal.y as f32],
+        tangent: [tangent.x as f32, tangent.y as f32],
+        distance: (-side * cross(tangent, a)) as f32,
+        along: (tangent.x * a.x + tangent.y * a.y) as f32,
+        u: 0.0,
+        length: length as f32,
+    };
+    (edge, length)
 }
 
 /// Appends the edges of an anti-clockwise polygon. `side` is 1 for normals that point out of it, -1 for normals into it.
@@ -344,17 +421,8 @@ fn push_edges(edges: &mut Vec<Edge>, corners: impl Iterator<Item = Vector2<f64>>
     let mut u = 0.0;
     let next = corners.clone().cycle().skip(1);
     for (a, b) in corners.zip(next) {
-        let length = ((b.x - a.x) * (b.x - a.x) + (b.y - a.y) * (b.y - a.y)).sqrt();
-        let tangent = (b - a) / length.max(1e-9);
-        let normal = Vector2::new(tangent.y, -tangent.x) * side;
-        edges.push(Edge {
-            normal: [normal.x as f32, normal.y as f32],
-            tangent: [tangent.x as f32, tangent.y as f32],
-            distance: (-side * cross(tangent, a)) as f32,
-            along: (tangent.x * a.x + tangent.y * a.y) as f32,
-            u: if side > 0.0 { u as f32 } else { 0.0 },
-            length: length as f32,
-        });
+        let (edge, length) = edge(a, b, side);
+        edges.push(Edge { u: if side > 0.0 { u as f32 } else { 0.0 }, ..edge });
         u += length;
     }
 }

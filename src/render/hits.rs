@@ -31,7 +31,8 @@ impl ColumnHits {
         let wall_count = frame.params.wall_count as usize;
         for (k, edge) in frame.edges[..wall_count].iter().enumerate() {
             let (a, b) = corners(edge);
-            if cross(a, b) <= 0.0 {
+            let [n, t] = [edge.normal, edge.tangent].map(|v| v.map(f64::from));
+            if cross(a, b) * (t[0] * n[1] - t[1] * n[0]) <= 0.0 {
                 continue; // seen from behind
             }
             for column in span(frame, [a, b].into_iter()) {

@@ -25,6 +25,7 @@ mod frame;
 mod gpu;
 mod hits;
 mod huge_pages;
+mod inner;
 mod instructions;
 mod now;
 mod sample;

@@ -516,7 +516,7 @@ mod tests {
     fn rows_that_see_many_tiles_see_only_these() {
         const GREY: u32 = 0xff80_8080;
         let level = MipLevel { base: 0, size: 1 };
-        let material = Material { tiles_per_m: [1.0; 2], last_level: 0, padding: 0, levels: [level; LEVELS] };
+        let material = Material { tiles_per_m: [1.0; 2], last_level: 0, foot_m: 0.0, levels: [level; LEVELS] };
         for tenths in 20..60 {
             let [u, v, step, slant] = [0.3, 0.7, 0.1 * tenths as f32, 0.0].map(|x| [x; LANES]);
             let places = StripPlaces { material: [&material; LANES], u, v, step, slant, first_row: [0; LANES] };

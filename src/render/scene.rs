@@ -7,6 +7,7 @@ use bytemuck::{Pod, Zeroable};
 use rayon::prelude::*;
 
 use super::huge_pages;
+use super::inner::InnerWalls;
 use super::texture::{self, Surface};
 use crate::error::Result;
 use crate::geometry::Vector2;
@@ -26,7 +27,8 @@ pub(super) struct Material {
     pub tiles_per_m: [f32; 2],
     /// Number of the coarsest level, of one texel.
     pub last_level: u32,
-    pub padding: u32,
+    /// Height from which v is counted on an upright surface, m.
+    pub foot_m: f32,
     /// Each about a quarter of an octave coarser than the one before.
     pub levels: [MipLevel; LEVELS],
 }
@@ -103,12 +105,14 @@ const MOST_PIECES: f64 = 4.0;
 /// A world packed for rendering: geometry, materials and textures, the same for both renderers.
 ///
 /// Surfaces are numbered like instances, from 0: the floor is surface 0 and instance 1, the ceiling surface 1 and instance 2,
-/// then the walls and then the bodies.
+/// then the walls, the bodies, the windows, and two for each wall inside the room: its right side and its faces across, and its
+/// left side.
 ///
 /// Textures are laid out in metres. On a wall u runs from its first corner to its second and v up from the floor, so that a
 /// wall longer than its texture's period shows the pattern again after each period. On a body u runs anti-clockwise around
 /// the footprint, from the first corner or from the body's own x axis, and v up from the underside. Floor and ceiling take the
-/// room's x and y, tops and undersides of bodies the body's own. Windows are thin prisms on their walls and come last.
+/// room's x and y, tops and undersides of bodies the body's own. Windows are thin prisms on their walls. On a wall inside the room
+/// u runs along its right side from its beginning, along its left side from its end, and v up from the floor, whatever is open.
 #[derive(Debug, Clone)]
 pub struct Scene {
     /// Tells textures of scenes apart, so that a renderer knows which ones it holds on its device.
@@ -117,6 +121,8 @@ pub struct Scene {
     pub(super) bodies: Vec<Prism>,
     /// Panes of windows, around the room's origin.
     pub(super) windows: Vec<Prism>,
+    /// What walls inside the room consist of.
+    pub(super) inner: InnerWalls,
     pub(super) room_height_m: f64,
     pub(super) camera_height_m: f64,
     /// Position of the camera on the robot, m.
@@ -153,9 +159,16 @@ impl Scene {
             .chain(world.wall_textures.iter().map(|t| (t, true)))
             .chain(world.bodies.iter().map(|b| (&b.texture, false)))
             .chain(world.windows.iter().map(|w| (&w.texture, false)))
+            .chain(world.partitions.iter().flat_map(|p| [(&p.texture, false); 2]))
             .map(|(texture, mirrored)| Surface::new(texture, mirrored))
             .collect();
-        let (materials, atlas) = pack(&surfaces);
+        let (mut materials, atlas) = pack(&surfaces);
+        let first_body = 2 + world.outline.len();
+        let feet = world.bodies.iter().map(|b| b.bottom_m).chain(world.windows.iter().map(|w| w.bottom_m));
+        let feet = feet.chain(world.partitions.iter().flat_map(|p| [0.0, -p.left_rise_m]));
+        for (material, foot_m) in materials[first_body..].iter_mut().zip(feet) {
+            material.foot_m = foot_m as f32;
+        }
         let body = |b: &Body| Prism {
             name: b.name.clone(),
             footprint: b.footprint.clone(),
@@ -177,6 +190,7 @@ impl Scene {
             outline: world.outline.clone(),
             bodies: world.bodies.iter().map(body).collect(),
             windows: world.windows.iter().map(window).collect(),
+            inner: InnerWalls::new(world, materials.len() - 2 * world.partitions.len()),
             room_height_m: world.spec.room.height_m,
             camera_height_m: world.spec.camera.height_m,
             camera_offset_m: Vector2::new(forward, left),
@@ -265,7 +279,7 @@ fn pack(surfaces: &[Surface<'_>]) -> (Vec<Material>, Vec<u32>) {
             *level = MipLevel { base, size };
             base += level.pitch() * level.pitch();
         }
-        packed.push(Material { tiles_per_m, last_level: b.sizes.len() as u32 - 1, padding: 0, levels });
+        packed.push(Material { tiles_per_m, last_level: b.sizes.len() as u32 - 1, foot_m: 0.0, levels });
     }
     (which.into_iter().map(|k| packed[k]).collect(), atlas)
 }

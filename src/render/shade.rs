@@ -88,19 +88,19 @@ impl<'a> Sides<'a> {
     #[inline(always)]
     pub fn new(scene: &'a Scene, frame: &Frame, runs: [&'a Run<'a>; LANES]) -> Self {
         let mut material = [&scene.materials[0]; LANES];
-        let [mut cosine, mut near, mut u, mut bottom, mut step, mut slant, mut v] = [[0.0_f32; LANES]; 7];
+        let [mut cosine, mut near, mut u, mut foot, mut step, mut slant, mut v] = [[0.0_f32; LANES]; 7];
         let mut first_row = [0; LANES];
         for (k, run) in runs.into_iter().enumerate() {
             let Run { hit, direction, .. } = run;
-            material[k] = &scene.materials[hit.surface as usize];
+            material[k] = &scene.materials[frame.material(hit.surface)];
             cosine[k] = -(hit.normal[0] * direction[0] + hit.normal[1] * direction[1]);
-            (near[k], u[k], bottom[k], first_row[k]) = (hit.near, hit.u, hit.bottom, run.first_row as i32);
+            (near[k], u[k], foot[k], first_row[k]) = (hit.near, hit.u, material[k].foot_m, run.first_row as i32);
         }
         let (eye, tan) = (frame.params.camera_height, frame.rows[0].tan);
         for k in 0..LANES {
             step[k] = near[k] * frame.params.pixel_rad;
             slant[k] = step[k] / cosine[k].max(LEAST_COSINE);
-            v[k] = eye + near[k] * tan - bottom[k].max(0.0);
+            v[k] = eye + near[k] * tan - foot[k];
         }
         let places = StripPlaces { material, u, v, step, slant, first_row };
         Self { runs, strips: Strips::new(&scene.atlas, &places), slant }
@@ -151,8 +151,8 @@ impl Side<'_> {
             return;
         }
         // Steps and level of detail change from row to row.
-        let material = &scene.materials[run.hit.surface as usize];
-        let (near, foot) = (run.hit.near, run.hit.bottom.max(0.0));
+        let material = &scene.materials[frame.material(run.hit.surface)];
+        let (near, foot) = (run.hit.near, material.foot_m);
         let u = within_tile(run.hit.u, material, 0);
         let rows = &frame.rows[run.first_row..run.first_row + run.count];
         for ((colour, row), light) in out.iter_mut().zip(rows).zip(light.as_flattened()) {
@@ -254,7 +254,7 @@ impl Plane {
     #[inline(always)]
     pub fn new(scene: &Scene, frame: &Frame, surface: u32, underside: bool) -> Self {
         let p = &frame.params;
-        let material = &scene.materials[surface as usize];
+        let material = &scene.materials[frame.material(surface)];
         let (mut camera, mut heading) = (p.camera, [1.0, 0.0]);
         let mut z = if underside { p.room_height } else { 0.0 };
         if surface >= 2 {
@@ -280,7 +280,7 @@ impl Plane {
         // Rows that are even in elevation are farther apart in its tangent.
         let spread = if frame.params.equal_angle == 0 { 1.0 } else { row.stretch * row.stretch };
         let deep = across * row.inverse_tan.abs() * spread;
-        let material = &scene.materials[self.surface as usize];
+        let material = &scene.materials[frame.material(self.surface)];
         let [u_per_m, v_per_m] = material.tiles_per_m;
         let level = level(material, (0.5 * deep.max(across)).max(deep.min(across)) * u_per_m.max(v_per_m));
         let size = level.size as f32;

@@ -117,6 +117,27 @@ mod tests {
     }
 
     #[test]
+    fn doors_and_windows_are_seen_through_and_walls_are_not() {
+        // The wall at x = 1.5 is met at y = 0 on the way to "east" and at y = 1.5 on that to "north-east". The camera looks from 0.4 m.
+        let seen_through = |openings: &str| {
+            let mut world = world(-3.0, 1.0, 0.0);
+            let wall = format!("from_m = [1.5, -5]\nto_m = [1.5, 5]\nopenings = [{openings}]");
+            world.spec.walls = vec![toml::from_str(&wall).unwrap()];
+            let world = World::from_spec(&world.spec, "walls").unwrap();
+            seen(&world, Pose::IDENTITY).iter().map(|s| s.0).collect::<Vec<_>>()
+        };
+        let door = "{ kind = \"door\", from_start_m = 4.6, width_m = 0.8 }";
+        assert_eq!(seen_through(""), [0; 0]);
+        assert_eq!(seen_through(door), [0]);
+        let window = |sill_m: f64, top_m: f64| {
+            format!("{{ kind = \"window\", from_start_m = 6, width_m = 1, sill_m = {sill_m}, top_m = {top_m} }}")
+        };
+        assert_eq!(seen_through(&format!("{door}, {}", window(0.3, 1.0))), [0, 1]);
+        assert_eq!(seen_through(&window(0.5, 1.0)), [0; 0], "a sill above the camera");
+        assert_eq!(seen_through(&window(0.1, 0.35)), [0; 0], "a lintel below it");
+    }
+
+    #[test]
     fn landmarks_hide_each_other() {
         let open = world(-3.0, 1.0, 0.0);
         // From due south of "north-east", "east" stands in the way.

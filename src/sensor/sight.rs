@@ -2,7 +2,7 @@
 
 use crate::geometry::{Pose, Vector2, cross};
 use crate::world::polygon::edges;
-use crate::world::{Footprint, World};
+use crate::world::{Footprint, Partition, World};
 
 /// Whether something stands between `camera` and the centre of body `target`, with the bodies at `bodies`.
 pub(super) fn hidden(world: &World, bodies: &[Pose], camera: Vector2<f64>, target: usize) -> bool {
@@ -14,7 +14,18 @@ pub(super) fn hidden(world: &World, bodies: &[Pose], camera: Vector2<f64>, targe
             && height_m < body.top_m
             && blocks(&body.footprint, pose.inverse_transform(camera), pose.inverse_transform(goal))
     });
-    by_a_body || behind_a_wall(world, camera, goal, &world.bodies[target].footprint)
+    by_a_body || by_a_partition(world, camera, goal) || behind_a_wall(world, camera, goal, &world.bodies[target].footprint)
+}
+
+/// Whether a wall inside the room stands between `camera` and `goal`; doors and windows at the camera's height are seen through.
+fn by_a_partition(world: &World, camera: Vector2<f64>, goal: Vector2<f64>) -> bool {
+    let height_m = world.spec.camera.height_m;
+    let meets = |wall: &Partition| {
+        let pieces = wall.pieces.iter().filter(|piece| piece.bottom_m <= height_m && height_m < piece.top_m);
+        let mut footprints = pieces.map(|piece| wall.footprint(piece.along_m));
+        footprints.any(|corners| edges(&corners).any(|(p, q)| crossing(camera, goal, p, q).is_some()))
+    };
+    world.partitions.iter().any(meets)
 }
 
 /// Whether the segment from `a` to `b`, both in the footprint's own frame, meets the footprint.

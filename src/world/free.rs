@@ -51,6 +51,12 @@ impl World {
                 return Err(format!("wall {k}"));
             }
         }
+        for partition in &self.partitions {
+            let mut stretches = partition.stretches(0.0, self.spec.robot.height_m).into_iter();
+            if stretches.any(|s| shape.gap_m(&Convex::polygon(&partition.footprint(s), 0.0)) < 0.0) {
+                return Err(partition.name.clone());
+            }
+        }
         for (body, pose) in bodies {
             if body.bottom_m < self.spec.robot.height_m && shape.gap_m(&Convex::of_body(body, pose)) < 0.0 {
                 return Err(body.name.clone());

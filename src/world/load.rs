@@ -8,10 +8,11 @@ use sha2::{Digest, Sha256};
 use super::picture::{Gallery, Pictures};
 use super::polygon::{anticlockwise, signed_area};
 use super::robot::{RobotPreset, RobotSpec};
-use super::spec::{BodySpec, CameraPreset, ShapeSpec, WindowSpec, WorldSpec};
+use super::spec::{BodySpec, CameraPreset, ShapeSpec, WallSpec, WindowSpec, WorldSpec};
 use super::structure::{self, Findings};
 use super::texture::Texture;
 use super::validate;
+use super::wall::{Partition, pieces};
 use super::{Body, Footprint, Window, World, Zone};
 use crate::document::Node;
 use crate::error::{Error, Result};
@@ -182,7 +183,7 @@ impl World {
             })
             .collect();
         let first_window = first_body + bodies.len() as u16;
-        let windows = spec
+        let windows: Vec<_> = spec
             .light
             .windows
             .iter()
@@ -198,6 +199,15 @@ impl World {
                 instance: first_window + k as u16,
             })
             .collect();
+        let first_partition = first_window + windows.len() as u16;
+        let partitions = spec.walls.iter().enumerate();
+        let partitions = partitions.map(|(k, w)| {
+            // Far from all others' seeds, for the same reason.
+            let texture = w.texture.as_ref().unwrap_or(&walls[0]);
+            let texture = Texture::new(texture, seed(u64::MAX / 4 + k as u64), pictures);
+            partition(w, k, spec.room.height_m, texture, first_partition.wrapping_add(k as u16))
+        });
+        let partitions = partitions.collect();
         let zones =
             spec.floor.zones.iter().map(|z| Zone { polygon: anticlockwise(&z.polygon_m), friction: z.friction }).collect();
         let home = Pose::new(spec.home.x_m, spec.home.y_m, spec.home.heading_deg.to_radians());
@@ -209,6 +219,7 @@ impl World {
             outline,
             bodies,
             windows,
+            partitions,
             zones,
             home,
             source: source.to_owned(),
@@ -249,6 +260,23 @@ fn footprint(body: &BodySpec) -> Footprint {
             Footprint::Polygon(vec![Vector2::new(-x, -y), Vector2::new(x, -y), Vector2::new(x, y), Vector2::new(-x, y)])
         }
         ShapeSpec::Polygon { corners_m } => Footprint::Polygon(anticlockwise(corners_m)),
+    }
+}
+
+/// The checked form of wall `k` inside a room of this height.
+fn partition(wall: &WallSpec, k: usize, room_height_m: f64, texture: Texture, instance: u16) -> Partition {
+    let [from, to] = [wall.from_m, wall.to_m].map(|[x, y]| Vector2::new(x, y));
+    let length_m = wall.length_m();
+    Partition {
+        name: if wall.name.is_empty() { format!("inner wall {k}") } else { wall.name.clone() },
+        from,
+        along: (to - from) / length_m.max(1e-9),
+        length_m,
+        thickness_m: wall.thickness_m,
+        pieces: pieces(wall, wall.height_m.unwrap_or(room_height_m)),
+        texture,
+        left_rise_m: 0.0,
+        instance,
     }
 }
 

@@ -18,6 +18,7 @@ pub mod spec;
 mod structure;
 mod texture;
 mod validate;
+mod wall;
 
 use std::path::PathBuf;
 
@@ -30,6 +31,7 @@ pub use picture::Picture;
 pub use robot::RobotSpec;
 pub use spec::{MotionSpec, TaskSpec, TextureFamily, TextureSpec, WorldSpec};
 pub use texture::{Pattern, Texture};
+pub use wall::{Partition, Piece};
 
 /// A checked world.
 #[derive(Debug, Clone, PartialEq)]
@@ -55,6 +57,8 @@ pub struct World {
     pub landmark_count: usize,
     /// Windows, in the file's order.
     pub windows: Vec<Window>,
+    /// Walls inside the room, in the file's order.
+    pub partitions: Vec<Partition>,
     /// Floor zones.
     pub zones: Vec<Zone>,
     /// Home pose.
@@ -76,8 +80,7 @@ impl Footprint {
     pub fn distance_to(&self, point: Vector2<f64>) -> f64 {
         match self {
             Self::Disc(radius) => (point.norm() - radius).max(0.0),
-            Self::Polygon(corners) if polygon::contains(corners, point) => 0.0,
-            Self::Polygon(corners) => polygon::distance_to_boundary(corners, point),
+            Self::Polygon(corners) => polygon::distance_to_polygon(corners, point),
         }
     }
 
@@ -204,7 +207,8 @@ impl World {
         let walls = (0..self.outline.len()).map(|k| (self.wall_instance(k), format!("wall {k}")));
         let bodies = self.bodies.iter().map(|b| (b.instance, b.name.clone()));
         let windows = self.windows.iter().map(|w| (w.instance, w.name.clone()));
-        planes.into_iter().chain(walls).chain(bodies).chain(windows).collect()
+        let partitions = self.partitions.iter().map(|p| (p.instance, p.name.clone()));
+        planes.into_iter().chain(walls).chain(bodies).chain(windows).chain(partitions).collect()
     }
 
     /// Poses of all bodies at time 0, in the order of [`World::bodies`].

@@ -74,6 +74,12 @@ pub fn distance_to_boundary(polygon: &[Vector2<f64>], point: Vector2<f64>) -> f6
     edges(polygon).map(|(a, b)| distance_to_segment(point, a, b)).fold(f64::INFINITY, f64::min)
 }
 
+/// Distance from `point` to the polygon, m; zero inside.
+#[must_use]
+pub fn distance_to_polygon(polygon: &[Vector2<f64>], point: Vector2<f64>) -> f64 {
+    if contains(polygon, point) { 0.0 } else { distance_to_boundary(polygon, point) }
+}
+
 /// Whether `point` lies inside or within `tolerance_m` of the boundary.
 #[must_use]
 pub fn contains_within(polygon: &[Vector2<f64>], point: Vector2<f64>, tolerance_m: f64) -> bool {

@@ -10,6 +10,7 @@ use super::robot::RobotSpec;
 pub use super::camera::{CameraPreset, CameraSpec, DirtSpec, NoiseSpec, OpticsSpec};
 pub use super::light::{LampSpec, LightFactors, LightPreset, LightSpec, WindowSpec};
 pub use super::texture::{TextureFamily, TextureSpec};
+pub use super::wall::{OpeningKind, OpeningSpec, WallSpec};
 
 /// A whole world file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -25,6 +26,9 @@ pub struct WorldSpec {
     pub seed: u64,
     /// Outline, height and surfaces of the room.
     pub room: RoomSpec,
+    /// Walls inside the room, with doors and windows.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub walls: Vec<WallSpec>,
     /// Friction of the floor.
     #[serde(default)]
     pub floor: FloorSpec,
@@ -312,6 +316,8 @@ impl WorldSpec {
         let windows = self.light.windows.iter().enumerate().map(|(k, w)| (format!("light.windows[{k}].texture"), &w.texture));
         let landmarks = self.landmarks.iter().enumerate().map(|(k, b)| (format!("landmarks[{k}].texture"), &b.texture));
         let obstacles = self.obstacles.iter().enumerate().map(|(k, b)| (format!("obstacles[{k}].texture"), &b.texture));
-        walls.chain(planes).chain(landmarks).chain(obstacles).chain(windows)
+        let inner = self.walls.iter().enumerate();
+        let inner = inner.filter_map(|(k, w)| Some((format!("walls[{k}].texture"), w.texture.as_ref()?)));
+        walls.chain(planes).chain(landmarks).chain(obstacles).chain(windows).chain(inner)
     }
 }

@@ -159,6 +159,7 @@ impl GpuRenderer {
         self.words.extend_from_slice(bytemuck::cast_slice(&frame.edges));
         self.words.extend_from_slice(bytemuck::cast_slice(&frame.bodies));
         self.words.extend_from_slice(bytemuck::cast_slice(&frame.lamps));
+        self.words.extend_from_slice(bytemuck::cast_slice(&frame.looks));
         moved |= self.tables.write(device, queue, &self.words);
         if self.scene != Some(scene.id) {
             let (materials, texels) = tile(scene);

@@ -6,7 +6,7 @@ use crate::geometry::Vector2;
 use crate::world::convex::{Convex, gap_to_walls_m};
 use crate::world::polygon::{anticlockwise, contains, contains_within, edges};
 use crate::world::spec::{BodySpec, ShapeSpec};
-use crate::world::{Body, Footprint, MotionSpec, World, WorldSpec};
+use crate::world::{Body, Footprint, MotionSpec, Piece, World, WorldSpec};
 
 /// Least length of a path's leg, m.
 const LEAST_LEG_M: f64 = 0.01;
@@ -32,8 +32,11 @@ pub(super) fn check_values(spec: &WorldSpec, faults: &mut Faults) {
         let allowed = "none, because landmarks stand still; a body that moves belongs to [[obstacles]]";
         faults.unless(landmark.motion.is_none(), format!("landmarks[{k}].motion"), "a motion", allowed);
     }
-    faults.distinct(bodies().map(|(place, body)| (place, body.name.as_str())));
-    let instances = spec.room.outline_m.len() + spec.landmarks.len() + spec.obstacles.len() + spec.light.windows.len();
+    let walls = spec.walls.iter().enumerate().filter(|(_, w)| !w.name.is_empty());
+    let walls = walls.map(|(k, w)| (format!("walls[{k}]"), w.name.as_str()));
+    faults.distinct(bodies().map(|(place, body)| (place, body.name.as_str())).chain(walls));
+    let walls = spec.room.outline_m.len() + spec.walls.len();
+    let instances = walls + spec.landmarks.len() + spec.obstacles.len() + spec.light.windows.len();
     let allowed = format!("at most {MOST_INSTANCES}");
     faults.unless(instances <= MOST_INSTANCES, "obstacles", format!("{instances} walls, bodies and windows in all"), allowed);
 }
@@ -126,6 +129,22 @@ pub(super) fn check_places(world: &World, places: &[String], faults: &mut Faults
             }
         }
     }
+    let pieces: Vec<_> = world.partitions.iter().flat_map(|p| p.pieces.iter().map(move |piece| (p, piece))).collect();
+    let pieces: Vec<_> =
+        pieces.iter().map(|(p, piece)| (*p, *piece, Convex::polygon(&p.footprint(piece.along_m), 0.0))).collect();
+    for (k, body) in world.bodies.iter().enumerate() {
+        let meets = |piece: &Piece| body.bottom_m + TOLERANCE_M < piece.top_m && piece.bottom_m + TOLERANCE_M < body.top_m;
+        for (partition, _, piece) in pieces.iter().filter(|(_, piece, _)| meets(piece)) {
+            let depth_m = -shapes[k].gap_m(piece);
+            if depth_m > TOLERANCE_M {
+                let position = body.pose.position();
+                let found = format!("[{}, {}], {depth_m:.3} m deep in \"{}\"", position.x, position.y, partition.name);
+                let allowed = "a body outside all walls; it may touch them";
+                faults.add(format!("{}.position_m", places[k]), found, allowed);
+                break;
+            }
+        }
+    }
     for (k, body) in world.bodies.iter().enumerate() {
         if inside[k] {
             check_motion(world, body, &places[k], faults);
@@ -148,6 +167,13 @@ fn check_motion(world: &World, body: &Body, place: &str, faults: &mut Faults) {
         let swept = Convex::corridor(a, b, reach_m);
         if gap_to_walls_m(&world.outline, &swept) < -TOLERANCE_M {
             return Some("a wall".to_owned());
+        }
+        let partition = world.partitions.iter().find(|p| {
+            let mut stretches = p.stretches(body.bottom_m, body.top_m).into_iter();
+            stretches.any(|s| swept.gap_m(&Convex::polygon(&p.footprint(s), 0.0)) < -TOLERANCE_M)
+        });
+        if let Some(partition) = partition {
+            return Some(format!("\"{}\"", partition.name));
         }
         let hit = standing.iter().find(|b| swept.gap_m(&Convex::of_body(b, &b.pose)) < -TOLERANCE_M);
         hit.map(|b| format!("\"{}\"", b.name))
@@ -184,6 +210,9 @@ fn check_motion(world: &World, body: &Body, place: &str, faults: &mut Faults) {
             }
             // What lies in the way of walks inside lies in the region or within reach of its edge.
             let enclosed = standing.iter().find(|b| contains(&region, b.pose.position())).map(|b| format!("\"{}\"", b.name));
+            let walls = world.partitions.iter().filter(|p| !p.stretches(body.bottom_m, body.top_m).is_empty());
+            let wall = walls.into_iter().find(|p| contains(&region, p.from)).map(|p| format!("\"{}\"", p.name));
+            let enclosed = enclosed.or(wall);
             if let Some(what) = enclosed.or_else(|| edges(&region).find_map(|(a, b)| in_the_way(a, b))) {
                 let allowed = format!("a region that keeps {reach_m:.3} m, the body's reach, from walls and standing bodies");
                 faults.add(&place, format!("a region too close to {what}"), allowed);

@@ -10,6 +10,7 @@ mod light;
 mod robot;
 mod room;
 mod starts;
+mod walls;
 
 use std::path::Path;
 
@@ -34,6 +35,7 @@ pub(super) fn check(spec: &WorldSpec, known: &[Fault]) -> Vec<Fault> {
     let mut faults = Faults { known: known.to_vec(), found: Vec::new() };
     check_name(spec, &mut faults);
     room::check_values(spec, &mut faults);
+    walls::check_values(spec, &mut faults);
     bodies::check_values(spec, &mut faults);
     light::check_values(spec, &mut faults);
     camera::check(spec, &mut faults);
@@ -43,7 +45,7 @@ pub(super) fn check(spec: &WorldSpec, known: &[Fault]) -> Vec<Fault> {
     if faults.touch("room.outline_m") || spec.room.walls.is_empty() {
         return faults.found; // without a room nothing has a place
     }
-    // Geometry comes from the resolved form, the same that a run uses. Bodies with faulty geometry are left out of it.
+    // Geometry comes from the resolved form, the same that a run uses. Bodies and walls with faulty geometry are left out of it.
     let mut world = World::resolve(spec.clone(), Path::new(""), String::new(), &Pictures::default());
     let mut places = Vec::new();
     let mut sound = Vec::new();
@@ -56,7 +58,12 @@ pub(super) fn check(spec: &WorldSpec, known: &[Fault]) -> Vec<Fault> {
     let mut keep = sound.iter();
     places.retain(|_| *keep.next().unwrap_or(&false));
 
+    let sound: Vec<usize> = (0..spec.walls.len()).filter(|&k| walls::is_sound(k, &faults)).collect();
+    let mut number = 0..;
+    world.partitions.retain(|_| number.next().is_some_and(|k| sound.binary_search(&k).is_ok()));
+
     room::check_places(&world, &mut faults);
+    walls::check_places(&world, &sound, &mut faults);
     light::check_places(&world, &mut faults);
     bodies::check_places(&world, &places, &mut faults);
     starts::check_places(&world, &mut faults);
