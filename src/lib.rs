@@ -41,12 +41,12 @@
 //!
 //! ```
 //! use std::ops::ControlFlow;
-//! use wayhome::episode::{Bearings, Bench, Outcome, PlantKind, Setup};
+//! use wayhome::episode::{SensorKind, Simulation, Outcome, PlantKind, Setup};
 //! use wayhome::world::World;
 //!
 //! let world = World::open("lab")?;
-//! let setup = Setup { plant: PlantKind::Unicycle, bearings: Bearings::Noisy, ..Setup::default() };
-//! let record = Bench::new(&world, &setup)?.run(7, &mut |_| ControlFlow::Continue(()))?;
+//! let setup = Setup { plant: PlantKind::Unicycle, sensor: SensorKind::Noisy, ..Setup::default() };
+//! let record = Simulation::new(&world, &setup)?.run(7, &mut |_| ControlFlow::Continue(()))?;
 //! assert_eq!(record.outcome, Outcome::Home);
 //! # Ok::<(), wayhome::Error>(())
 //! ```
@@ -94,7 +94,3 @@ pub mod vision;
 pub mod world;
 
 pub use error::{Error, Result};
-
-/// Version of this program and the commit that it was built from, as in `0.1.0 (6278fe7)`; `+changes` follows the commit where
-/// the sources differed from it. Where the commit is not known, as without git, the version stands alone.
-pub const VERSION: &str = env!("WAYHOME_VERSION");

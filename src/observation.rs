@@ -207,6 +207,23 @@ pub struct Decision {
     pub nis: f64,
 }
 
+impl Decision {
+    /// A command of a method on its way that tells nothing of what it believes.
+    ///
+    /// ```
+    /// use wayhome::geometry::Twist;
+    /// use wayhome::observation::{Decision, Status};
+    ///
+    /// let ahead = Twist { v: 0.2, omega: 0.0 };
+    /// let stop = Decision { status: Status::Arrived, ..Decision::command(Twist::default()) };
+    /// assert_eq!((Decision::command(ahead).status, stop.status), (Status::Running, Status::Arrived));
+    /// ```
+    #[must_use]
+    pub fn command(command: Twist) -> Self {
+        Self { command, estimate: None, status: Status::Running, matched: 0, rejected: 0, nis: f64::NAN }
+    }
+}
+
 /// A homing method: observations in, wheel commands out.
 pub trait Method: Send {
     /// Takes one observation and returns the command to hold until the next.

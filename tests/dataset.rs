@@ -13,7 +13,7 @@ use wayhome::dataset::check::{FaultKind, check};
 use wayhome::dataset::conditions::Condition;
 use wayhome::dataset::pipeline::{Job, Outcome};
 use wayhome::dataset::plan::{Headings, Places, Plan, Request};
-use wayhome::episode::{Bearings, Bench, PlantKind, Setup, Start};
+use wayhome::episode::{PlantKind, SensorKind, Setup, Simulation, Start};
 use wayhome::geometry::{Pose, wrap};
 use wayhome::method::MethodKind;
 use wayhome::panorama::Panorama;
@@ -423,29 +423,29 @@ fn a_set_leads_home() {
     for choice in [DatasetChoice { folder: folder.path().to_owned(), ..DatasetChoice::default() }, untold] {
         let setup = Setup {
             plant: PlantKind::Unicycle,
-            bearings: Bearings::Dataset,
+            sensor: SensorKind::Dataset,
             method: MethodKind::Weber,
             dataset: Some(choice),
             compass_sd_rad: Some(0.0),
             start: Start::At(Pose::new(4.3, 3.9, 2.0)),
             ..Setup::default()
         };
-        let record = Bench::new(&world, &setup).unwrap().run(1, &mut |_| ControlFlow::Continue(())).unwrap();
+        let record = Simulation::new(&world, &setup).unwrap().run(1, &mut |_| ControlFlow::Continue(())).unwrap();
         let last = record.steps.last().unwrap();
         let distance_m = (last.truth.position() - world.home.position()).norm();
         assert!(distance_m < 0.15, "{distance_m} m from home, {:?}", record.outcome);
     }
     let bad = |choice: DatasetChoice| {
-        let setup = Setup { bearings: Bearings::Dataset, dataset: Some(choice), ..Setup::default() };
-        Bench::new(&world, &setup).map(|_| ()).unwrap_err().to_string()
+        let setup = Setup { sensor: SensorKind::Dataset, dataset: Some(choice), ..Setup::default() };
+        Simulation::new(&world, &setup).map(|_| ()).unwrap_err().to_string()
     };
     // Of another world.
     let setup = Setup {
-        bearings: Bearings::Dataset,
+        sensor: SensorKind::Dataset,
         dataset: Some(DatasetChoice { folder: folder.path().to_owned(), ..DatasetChoice::default() }),
         ..Setup::default()
     };
-    let message = Bench::new(&World::open("gallery").unwrap(), &setup).map(|_| ()).unwrap_err().to_string();
+    let message = Simulation::new(&World::open("gallery").unwrap(), &setup).map(|_| ()).unwrap_err().to_string();
     assert!(message.contains("set of the world `lab`") && message.contains("home of `gallery`"), "{message}");
     let folder = folder.path().join("original");
     assert!(bad(DatasetChoice { folder: folder.clone(), ..DatasetChoice::default() }).contains("--dataset-spacing-m"));

@@ -7,13 +7,14 @@ use std::ops::ControlFlow;
 
 use num_dual::{Dual64, DualNum};
 use rayon::prelude::*;
-use wayhome::episode::{Bearings, Bench, Outcome, Setup};
+use wayhome::control::Law;
+use wayhome::episode::{Outcome, SensorKind, Setup, Simulation};
 use wayhome::estimation::anchored::map::predict_bearing;
 use wayhome::estimation::anchored::motion::SlipWatch;
 use wayhome::estimation::anchored::{AnchoredFilter, FilterSettings};
 use wayhome::estimation::paper;
 use wayhome::geometry::{Pose, Twist, Vector2, angle_of, wrap};
-use wayhome::method::{LawKind, MethodKind, build};
+use wayhome::method::{MethodKind, MethodOptions, build};
 use wayhome::observation::{
     Bearing, Briefing, Estimate, HomeSnapshot, LandmarkId, Observation, Odometry, RobotSheet, Status, TaskSheet,
 };
@@ -70,7 +71,7 @@ struct Setting {
     odometry_sd_share: f64,
     false_share: f64,
     method: MethodKind,
-    law: LawKind,
+    law: Law,
     distance_m: (f64, f64),
     /// When the robot is moved without its wheels, s, and how, in its own frame.
     carried: Option<(f64, Pose)>,
@@ -141,7 +142,8 @@ fn trial(setting: &Setting, seed: u64) -> Trial {
         compass: false,
         camera: None,
     };
-    let mut method = build(setting.method.clone(), setting.law, FilterSettings::default(), briefing, None).unwrap();
+    let options = MethodOptions { law: setting.law, ..MethodOptions::default() };
+    let mut method = build(setting.method.clone(), &options, briefing).unwrap();
     let filter_settings = FilterSettings { track_m: 0.23, ..FilterSettings::default() };
     let mut slip = SlipWatch::default();
     let mut odometry = Odometry::default();
@@ -234,7 +236,7 @@ fn base(count: usize, bearing_sd_deg: f64) -> Setting {
         odometry_sd_share: 0.04,
         false_share: 0.0,
         method: MethodKind::AnchoredEkf,
-        law: LawKind::Proportional,
+        law: Law::Proportional,
         distance_m: (0.5, 3.0),
         carried: None,
         slips: false,
@@ -253,7 +255,7 @@ fn home_from_nothing_known() {
         ("30 landmarks, 0.3 deg, 10 % false", Setting { false_share: 0.1, ..base(30, 0.3) }, 40, 39),
         // One run in a hundred claimed home wrongly when bearings were gated one by one only.
         ("30 landmarks, 0.3 deg, 30 % false", Setting { false_share: 0.3, ..base(30, 0.3) }, 400, 396),
-        ("30 landmarks, 0.3 deg, Lyapunov", Setting { law: LawKind::Lyapunov, ..base(30, 0.3) }, 40, 39),
+        ("30 landmarks, 0.3 deg, Lyapunov", Setting { law: Law::Lyapunov, ..base(30, 0.3) }, 40, 39),
     ];
     for (name, setting, seeds, least) in cases {
         let summary = run(name, &setting, seeds);
@@ -311,8 +313,8 @@ fn on_ice_home_is_claimed_at_rest() {
     let mut draft = Draft::open("lab").unwrap();
     draft.set_friction(0.05).unwrap();
     let world = draft.world().unwrap();
-    let setup = Setup { bearings: Bearings::Noisy, ..Setup::default() };
-    let one = |seed: u64| Bench::new(&world, &setup).unwrap().run(seed, &mut |_| ControlFlow::Continue(())).unwrap();
+    let setup = Setup { sensor: SensorKind::Noisy, ..Setup::default() };
+    let one = |seed: u64| Simulation::new(&world, &setup).unwrap().run(seed, &mut |_| ControlFlow::Continue(())).unwrap();
     let runs: Vec<_> = (1..=20_u64).into_par_iter().map(one).collect();
     let home = runs.iter().filter(|r| r.outcome == Outcome::Home).count();
     let wrong = runs.iter().filter(|r| r.claimed_home && r.outcome != Outcome::Home).count();

@@ -24,7 +24,7 @@ fn ideal() -> Ideal {
 /// Every cell of R and theta at or below the printed one, from the true start; alpha at rounding.
 #[test]
 fn table_one_is_met() {
-    let runs = ideal().table_one();
+    let runs = ideal().table_one().unwrap();
     assert_eq!(runs.len(), 8);
     for run in &runs {
         let row = STARTS.iter().position(|s| *s == run.start).unwrap();
@@ -55,7 +55,7 @@ fn the_filter_needs_the_true_start_and_the_printed_jacobian_freezes_alpha() {
         noise: Some((0.01, 1)),
         ..Twists::default()
     };
-    assert!(ideal().runs(&twists, |start| *start).iter().all(|run| run.track.rmse().unwrap()[2] < 1e-13));
+    assert!(ideal().runs(&twists, |start| *start).unwrap().iter().all(|run| run.track.rmse().unwrap()[2] < 1e-13));
 }
 
 /// J, K, P and Q against automatic differentiation of (4) with (3), as printed.
@@ -104,7 +104,7 @@ fn the_comparison_has_the_order_that_the_page_states() {
         assert!(across < ratio(Entrant::Paper(Law::Proportional)).unwrap(), "the law matters more than the method");
     }
     // Exact odometry from the true start needs no bearings.
-    let claims = image_claims(&case);
+    let claims = image_claims(&case).unwrap();
     assert!(claims.blind.iter().all(|t| t.range_rmse_cm < 1e-6) && claims.faithful.iter().all(|t| t.range_rmse_cm > 1e-4));
     assert!(claims.one_look_cm > 0.1 && claims.untold.iter().all(|t| t.home <= 1));
 }
@@ -149,7 +149,9 @@ fn a_set_on_disk_drops_in() {
     misses.sort_by(f64::total_cmp);
     println!("{} bearings in common, median difference {:.3} deg", misses.len(), misses[misses.len() / 2].to_degrees());
     assert!(misses.len() > 300 && misses[misses.len() / 2] < 0.3_f64.to_radians());
-    assert!(disk.runs(wayhome::study::paper::images::image_settings(), |start| *start).iter().all(|run| run.track.home));
+    assert!(
+        disk.runs(wayhome::study::paper::images::image_settings(), |start| *start).unwrap().iter().all(|run| run.track.home)
+    );
     // A set of another grid is refused by what it has.
     std::fs::remove_file(folder.path().join("9_16.pgm")).unwrap();
     assert!(ImageCase::new(ImageSet::Vardy, Some(folder.path())).unwrap_err().to_string().contains("(9, 16)"));

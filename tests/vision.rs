@@ -6,7 +6,7 @@ use std::ops::ControlFlow;
 use std::path::Path;
 use std::sync::LazyLock;
 
-use wayhome::episode::{Bench, Outcome, Setup};
+use wayhome::episode::{Outcome, Setup, Simulation};
 use wayhome::geometry::{Pose, direction, wrap};
 use wayhome::observation::Bearing;
 use wayhome::panorama::{Panorama, Projection, Shot};
@@ -157,7 +157,7 @@ fn objects_are_landmarks_too() {
 fn objects_lead_home() {
     let extractor = ExtractorSettings { landmarks: Landmarks::Objects, ..ExtractorSettings::default() };
     let setup = Setup { extractor, renderer: RendererChoice::Cpu, ..Setup::default() };
-    let mut bench = Bench::new(&LAB.world, &setup).expect("the lab is ready");
+    let mut bench = Simulation::new(&LAB.world, &setup).expect("the lab is ready");
     for seed in 1..=3 {
         let record = bench.run(seed, &mut |_| ControlFlow::Continue(())).expect("it runs");
         assert_eq!(record.outcome, Outcome::Home, "seed {seed}");

@@ -5,9 +5,10 @@ use std::path::PathBuf;
 
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Parser, Subcommand};
-use wayhome::episode::{Bearings, Look, PlantKind, Start};
+use wayhome::control::Law;
+use wayhome::episode::{Look, PlantKind, SensorKind, Start};
 use wayhome::geometry::Pose;
-use wayhome::method::{LawKind, MethodKind};
+use wayhome::method::MethodKind;
 use wayhome::render::RendererChoice;
 use wayhome::report::paper::Target;
 use wayhome::study::robustness::Axis;
@@ -44,7 +45,7 @@ Exit codes:
 
 /// Headless, physics-simulated robot testbed for bearing-only visual homing
 #[derive(Debug, Parser)]
-#[command(version = wayhome::VERSION, after_help = EXIT_CODES)]
+#[command(version, after_help = EXIT_CODES)]
 pub struct Args {
     #[command(flatten)]
     pub common: CommonArgs,
@@ -118,13 +119,13 @@ pub struct HomeArgs {
     pub plant: PlantKind,
     /// Where bearings come from
     #[arg(long, default_value = "rendered", value_parser = choice(BEARINGS))]
-    pub bearings: Bearings,
+    pub bearings: SensorKind,
     /// Homing method
     #[arg(long, default_value = "anchored-ekf", value_parser = MethodParser)]
     pub method: MethodKind,
     /// Steering law of the methods that estimate where home is
     #[arg(long, default_value = "proportional", value_parser = choice(LAWS))]
-    pub controller: LawKind,
+    pub controller: Law,
     #[command(flatten)]
     pub patience: PatienceArgs,
     /// What a landmark of rendered bearings is [default: features]
@@ -236,13 +237,13 @@ pub struct RobustnessArgs {
     pub axis: Vec<Axis>,
     /// Where bearings come from, before they are made worse
     #[arg(long, default_value = "rendered", value_parser = choice(BEARINGS))]
-    pub bearings: Bearings,
+    pub bearings: SensorKind,
     /// Homing method
     #[arg(long, default_value = "anchored-ekf", value_parser = MethodParser)]
     pub method: MethodKind,
     /// Steering law of the methods that estimate where home is
     #[arg(long, default_value = "proportional", value_parser = choice(LAWS))]
-    pub controller: LawKind,
+    pub controller: Law,
     #[command(flatten)]
     pub patience: PatienceArgs,
     /// What renders
@@ -402,16 +403,16 @@ pub const PLANTS: &[Choice<PlantKind>] = &[
     (PlantKind::Unicycle, "unicycle", "The unicycle's kinematics with perfect odometry; nothing stops it"),
 ];
 
-pub const BEARINGS: &[Choice<Bearings>] = &[
-    (Bearings::Rendered, "rendered", "Features of rendered panoramas, found again from the home panorama"),
-    (Bearings::Ideal, "ideal", "True bearings of the landmark bodies' centres, where nothing hides them"),
-    (Bearings::Noisy, "noisy", "Ideal bearings with noise, drop-outs and false matches"),
-    (Bearings::Dataset, "dataset", "Features of the panoramas of a set on disk, see --dataset"),
+pub const BEARINGS: &[Choice<SensorKind>] = &[
+    (SensorKind::Rendered, "rendered", "Features of rendered panoramas, found again from the home panorama"),
+    (SensorKind::Ideal, "ideal", "True bearings of the landmark bodies' centres, where nothing hides them"),
+    (SensorKind::Noisy, "noisy", "Ideal bearings with noise, drop-outs and false matches"),
+    (SensorKind::Dataset, "dataset", "Features of the panoramas of a set on disk, see --dataset"),
 ];
 
-const LAWS: &[Choice<LawKind>] = &[
-    (LawKind::Proportional, "proportional", "Turn rate proportional to the heading error"),
-    (LawKind::Lyapunov, "lyapunov", "The paper's switching law"),
+const LAWS: &[Choice<Law>] = &[
+    (Law::Proportional, "proportional", "Turn rate proportional to the heading error"),
+    (Law::Lyapunov, "lyapunov", "The paper's switching law"),
 ];
 
 pub const RENDERERS: &[Choice<RendererChoice>] = &[
@@ -485,12 +486,12 @@ pub fn name_of<T: PartialEq>(choices: &[Choice<T>], wanted: &T) -> &'static str 
 }
 
 /// What `--bearings` calls a sensor.
-pub fn bearings_name(bearings: Bearings) -> &'static str {
+pub fn bearings_name(bearings: SensorKind) -> &'static str {
     name_of(BEARINGS, &bearings)
 }
 
 /// What `--controller` calls a law.
-pub fn law_name(law: LawKind) -> &'static str {
+pub fn law_name(law: Law) -> &'static str {
     name_of(LAWS, &law)
 }
 

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use anyhow::Result;
 use serde::Serialize;
-use wayhome::episode::{Bearings, PlantKind, Setup};
+use wayhome::episode::{PlantKind, SensorKind, Setup};
 use wayhome::method::exec::ExecCommand;
 use wayhome::render::RendererChoice;
 use wayhome::report::compare as report;
@@ -16,7 +16,6 @@ use wayhome::world::World;
 use super::Verdict;
 use super::args::{BEARINGS, PLANTS, RENDERERS, bearings_name, choice, name_of, not_negative, positive, quoted, seeds, size};
 use super::context::{Context, default_folder};
-use super::home::needs_bearings;
 use super::method_args::{PatienceArgs, program};
 
 /// Arguments of `compare`.
@@ -30,7 +29,7 @@ pub struct CompareArgs {
     pub plant: PlantKind,
     /// Where bearings come from
     #[arg(long, default_value = "noisy", value_parser = choice(BEARINGS))]
-    pub bearings: Bearings,
+    pub bearings: SensorKind,
     /// Random starts: one a seed from A to B, both included
     #[arg(long, value_name = "A..B", default_value = "1..20", value_parser = seeds)]
     pub seeds: RangeInclusive<u64>,
@@ -71,7 +70,6 @@ struct Output<'a> {
 }
 
 pub fn run(args: &CompareArgs, context: &Context) -> Result<Verdict> {
-    needs_bearings(args.size.is_some(), "--size", args.bearings, Bearings::Rendered)?;
     let mut contenders = pick(&args.contenders)?;
     for (number, command) in (1..).zip(&args.method) {
         command.check()?;
@@ -81,13 +79,14 @@ pub fn run(args: &CompareArgs, context: &Context) -> Result<Verdict> {
     let world = World::open(&args.world)?;
     let setup = Setup {
         plant: args.plant,
-        bearings: args.bearings,
+        sensor: args.bearings,
         renderer: args.renderer,
         size_px: args.size,
         compass_sd_rad: Some(args.compass_deg.unwrap_or(0.0).to_radians()),
         time_limit_s: args.time_limit_s,
         ..Setup::default()
     };
+    setup.check()?;
     let range = format!("{}..{}", args.seeds.start(), args.seeds.end());
     let out = args.out.clone().unwrap_or_else(|| default_folder(&["compare", &world.spec.name, &range]));
     let folder = OutputFolder::open(&out, "compare", report::FILES)?;
@@ -124,7 +123,7 @@ fn command(args: &CompareArgs) -> String {
     if let Some(compass_deg) = args.compass_deg.filter(|deg| *deg > 0.0 || !args.method.is_empty()) {
         flag("compass-deg", compass_deg.to_string());
     }
-    if args.bearings == Bearings::Rendered {
+    if args.bearings == SensorKind::Rendered {
         flag("renderer", name_of(RENDERERS, &args.renderer).to_owned());
     }
     if let Some((width, height)) = args.size {

@@ -145,11 +145,6 @@ pub struct SetArgs {
 }
 
 impl SetArgs {
-    /// Whether any of them is given.
-    pub fn is_given(&self) -> bool {
-        self.dataset.is_some()
-    }
-
     /// What they stand for.
     pub fn choice(&self) -> Option<DatasetChoice> {
         self.dataset.as_ref().map(|folder| DatasetChoice {

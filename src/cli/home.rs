@@ -7,9 +7,9 @@ use std::sync::Mutex;
 use anyhow::{Result, bail};
 use serde::Serialize;
 use wayhome::Error;
-use wayhome::episode::{Bearings, Bench, Look, Outcome, Progress, Setup, Summary};
+use wayhome::episode::{Look, Outcome, Progress, Recorder, Setup, Simulation, Summary};
 use wayhome::record::Recordings;
-use wayhome::record::run as run_report;
+use wayhome::record::run::RunFiles;
 use wayhome::report::{seeds as seeds_report, text};
 use wayhome::sensor::Noise;
 use wayhome::storage::OutputFolder;
@@ -20,7 +20,7 @@ use wayhome::vision::ExtractorSettings;
 use wayhome::world::World;
 
 use super::Verdict;
-use super::args::{self, HomeArgs};
+use super::args::HomeArgs;
 use super::context::{Context, default_folder};
 use super::threads::awake;
 
@@ -78,25 +78,24 @@ fn verdict(summary: &Summary) -> Verdict {
 }
 
 fn single(args: &HomeArgs, context: &Context, world: &World, setup: &Setup, seed: u64, out: &Path) -> Result<Summary> {
-    setup.method.check()?;
+    setup.check()?;
     setup.start_pose(world, wayhome::random::Seed(seed))?; // before a folder is made for a run that cannot start
     let paths = args.recordings.paths();
     paths.check(out)?;
-    let folder = OutputFolder::open(out, "home", run_report::FILES)?;
-    let mut bench = Bench::new(world, setup)?;
-    let mut recordings = Recordings::open(world, &paths)?;
+    let files = RunFiles::open(out, "home", world)?;
+    let mut simulation = Simulation::new(world, setup)?;
+    let recorders: Vec<Box<dyn Recorder>> = vec![Box::new(Recordings::open(world, &paths)?), Box::new(files)];
+    simulation.record_to(recorders);
     let bar = context.progress(None)?;
     let mut watch = |progress: &Progress| {
         bar.set_message(format!("{:.1} s, {:.2} m from home", progress.time_s, progress.distance_m));
         bar.tick();
         if context.is_stopped() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     };
-    let mut run = || bench.run_recorded(seed, &mut watch, &mut recordings);
-    let record = if setup.bearings.are_seen() { awake(run)?? } else { run()? };
+    let mut run = || simulation.run(seed, &mut watch);
+    let record = if setup.sensor.is_seeing() { awake(run)?? } else { run()? };
     bar.finish_and_clear();
     let summary = Summary::new(&record, world, setup, seed);
-    recordings.finish(&summary)?;
-    run_report::write(folder, world, &record, &summary)?;
     let output = RunOutput { summary: &summary, out: out.display().to_string() };
     context.print(&output, || text::run(&summary, out))?;
     Ok(summary)
@@ -105,7 +104,7 @@ fn single(args: &HomeArgs, context: &Context, world: &World, setup: &Setup, seed
 fn batch(args: &HomeArgs, context: &Context, world: &World, setup: &Setup, seeds: &RangeInclusive<u64>) -> Result<Verdict> {
     let range = format!("{}..{}", seeds.start(), seeds.end());
     let out = args.out.clone().unwrap_or_else(|| default_folder(&["home", &world.spec.name, &range]));
-    setup.method.check()?;
+    setup.check()?;
     let folder = OutputFolder::open(&out, "home --seeds", seeds_report::FILES)?;
     let bar = context.progress(Some(seeds.end() - seeds.start() + 1))?;
     bar.tick();
@@ -131,21 +130,14 @@ fn batch(args: &HomeArgs, context: &Context, world: &World, setup: &Setup, seeds
 
 /// The setup that the arguments ask for.
 fn setup(args: &HomeArgs) -> Result<Setup, Error> {
-    let noisy = args.noise_deg.is_some() || args.noise_dropout.is_some() || args.noise_false.is_some();
-    needs_bearings(noisy, "--noise-*", args.bearings, Bearings::Noisy)?;
-    needs_bearings(args.size.is_some(), "--size", args.bearings, Bearings::Rendered)?;
-    needs_bearings(args.set.is_given(), "--dataset*", args.bearings, Bearings::Dataset)?;
-    if args.bearings != Bearings::Dataset {
-        needs_bearings(args.landmarks.is_some(), "--landmarks", args.bearings, Bearings::Rendered)?;
-    }
     let (look, home_look) = (args.look.look(), Look { light: args.home_light, camera: args.home_camera });
-    needs_bearings(look.or(home_look) != Look::default(), "--light and --camera", args.bearings, Bearings::Rendered)?;
+    let noisy = args.noise_deg.is_some() || args.noise_dropout.is_some() || args.noise_false.is_some();
     let usual = Noise::default();
     let mut extractor = ExtractorSettings::default();
     extractor.landmarks = args.landmarks.unwrap_or(extractor.landmarks);
     Ok(Setup {
         plant: args.plant,
-        bearings: args.bearings,
+        sensor: args.bearings,
         method: args.patience.method(&args.method),
         law: args.controller,
         renderer: args.renderer,
@@ -154,24 +146,15 @@ fn setup(args: &HomeArgs) -> Result<Setup, Error> {
         look,
         home_look,
         dataset: args.set.choice(),
-        noise: Noise {
+        noise: noisy.then(|| Noise {
             sd_rad: args.noise_deg.map_or(usual.sd_rad, f64::to_radians),
             dropout: args.noise_dropout.unwrap_or(usual.dropout),
             false_match: args.noise_false.unwrap_or(usual.false_match),
-        },
+        }),
         compass_sd_rad: args.compass_deg.map(f64::to_radians),
         start: args.start.clone(),
         initial_estimate: args.initial_estimate,
         time_limit_s: args.time_limit_s,
         ..Setup::default()
     })
-}
-
-/// Refuses a flag that would do nothing with the sensor that was chosen.
-pub fn needs_bearings(given: bool, flag: &str, found: Bearings, needed: Bearings) -> Result<(), Error> {
-    if !given || found == needed {
-        return Ok(());
-    }
-    let name = |bearings| format!("--bearings {}", args::bearings_name(bearings));
-    Err(Error::Invalid { what: format!("sensor for {flag}"), found: name(found), allowed: name(needed) })
 }

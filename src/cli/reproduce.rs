@@ -133,10 +133,10 @@ impl<'a> Workshop<'a> {
         Ok(match target {
             Target::Table1 => {
                 let settings = PaperSettings { transition: Transition::Printed, ..PaperSettings::default() };
-                let printed = self.ideal.runs(&Twists { settings, ..Twists::default() }, |start| *start);
-                page::table_one(self.table_one(), &printed)
+                let printed = self.ideal.runs(&Twists { settings, ..Twists::default() }, |start| *start)?;
+                page::table_one(self.table_one()?, &printed)
             }
-            Target::Fig3 => page::fig_three(self.table_one())?,
+            Target::Fig3 => page::fig_three(self.table_one()?)?,
             Target::Table2 => page::table_two(self.case(own)?, self.runs(own)?, self.image_claims(own)?)?,
             Target::Fig5 => page::fig_five(self.case(own)?, self.runs(own)?)?,
             Target::Fig7 => page::fig_seven(self.case(vardy)?, self.runs(vardy)?, self.image_claims(vardy)?)?,
@@ -147,10 +147,10 @@ impl<'a> Workshop<'a> {
                 let world = World::open("paper-ideal")?;
                 let homeward = map(&world, Facing::Homeward, MAP_SPACING_M)?;
                 let east = map(&world, Facing::Heading(0.0), MAP_SPACING_M)?;
-                page::observability(&self.ideal, self.table_one(), &homeward, &east)?
+                page::observability(&self.ideal, self.table_one()?, &homeward, &east)?
             }
             Target::Audit => page::audit(&Evidence {
-                ideal: self.table_one(),
+                ideal: self.table_one()?,
                 images: self.runs(own)?,
                 claims: &claims(&self.ideal)?,
                 image_claims: [self.image_claims(own)?, self.image_claims(vardy)?],
@@ -160,8 +160,8 @@ impl<'a> Workshop<'a> {
         })
     }
 
-    fn table_one(&self) -> &[Run] {
-        self.table_one.get_or_init(|| self.ideal.table_one())
+    fn table_one(&self) -> Result<&Vec<Run>, Error> {
+        made(&self.table_one, || self.ideal.table_one())
     }
 
     fn case(&self, k: usize) -> Result<&ImageCase, Error> {
@@ -170,12 +170,12 @@ impl<'a> Workshop<'a> {
 
     fn runs(&self, k: usize) -> Result<&Vec<Run>, Error> {
         let case = self.case(k)?;
-        Ok(self.runs[k].get_or_init(|| case.runs(image_settings(), |start| *start)))
+        made(&self.runs[k], || case.runs(image_settings(), |start| *start))
     }
 
     fn image_claims(&self, k: usize) -> Result<&ImageClaims, Error> {
         let case = self.case(k)?;
-        Ok(self.image_claims[k].get_or_init(|| image_claims(case)))
+        made(&self.image_claims[k], || image_claims(case))
     }
 
     fn contests(&self, k: usize) -> Result<&[Contest; 2], Error> {

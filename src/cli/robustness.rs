@@ -14,7 +14,6 @@ use wayhome::world::World;
 use super::Verdict;
 use super::args::{RobustnessArgs, bearings_name, law_name, quoted, renderer_name};
 use super::context::{Context, default_folder};
-use super::home::needs_bearings;
 
 /// What `--json` prints: the study and where the files are.
 #[derive(Serialize)]
@@ -25,10 +24,9 @@ struct Output<'a> {
 }
 
 pub fn run(args: &RobustnessArgs, context: &Context) -> Result<Verdict> {
-    needs_bearings(args.size.is_some(), "--size", args.bearings, wayhome::episode::Bearings::Rendered)?;
     let world = World::open(&args.world)?;
     let setup = Setup {
-        bearings: args.bearings,
+        sensor: args.bearings,
         method: args.patience.method(&args.method),
         law: args.controller,
         renderer: args.renderer,
@@ -36,7 +34,7 @@ pub fn run(args: &RobustnessArgs, context: &Context) -> Result<Verdict> {
         time_limit_s: args.time_limit_s,
         ..Setup::default()
     };
-    setup.method.check()?;
+    setup.check()?;
     let axes = axes(args);
     let range = format!("{}..{}", args.seeds.start(), args.seeds.end());
     let out = args.out.clone().unwrap_or_else(|| default_folder(&["robustness", &world.spec.name, &range]));

@@ -9,22 +9,39 @@ pub mod vectors;
 
 pub mod escape;
 
+use serde::Serialize;
+use strum::{Display, EnumMessage, IntoStaticStr, VariantArray};
+
 use crate::geometry::{Pose, Twist, angle_of, wrap};
 use crate::observation::{RobotSheet, TaskSheet};
 
-/// Steering laws.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+/// Steering laws, by the names that the command line has for them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Display, EnumMessage, IntoStaticStr, VariantArray)]
+#[serde(rename_all = "kebab-case")]
+#[strum(serialize_all = "kebab-case")]
 pub enum Law {
-    /// The paper's omega = pi - (alpha - theta), wrapped, with a gain.
+    /// Turn rate proportional to the heading error: the paper's omega = pi - (alpha - theta), wrapped, with a gain.
     Proportional,
-    /// The paper's (16): omega = beta (v / Rc) sgn(theta'), beta > 1.
+    /// The paper's switching law (16), omega = beta (v / Rc) sgn(theta'), beta > 1.
     Lyapunov,
+}
+
+/// How fast a robot drives under a law, and how much care is taken of its limits.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Pace {
+    /// Within the limits of robot and task: slower where home lies aside, and no faster than it can brake at home.
+    Governed,
+    /// As the paper's simulations have it: the law as it is printed, with its beta, always at cruising speed.
+    Constant {
+        /// Free parameter of (16), more than 1. The paper does not say which one it used.
+        beta: f64,
+    },
 }
 
 /// Gain of the proportional law on robots that can turn fast, 1/s. The paper's own gain is 1.
 const STEERING_GAIN: f64 = 4.0;
-/// The paper's beta.
-const BETA: f64 = 1.5;
+/// The beta of (16) where nothing else is said. The paper says only that it is more than 1.
+pub const BETA: f64 = 1.5;
 /// Deceleration planned for the last stretch, as a share of the drive's own.
 const BRAKING_SHARE: f64 = 0.9;
 
@@ -32,6 +49,7 @@ const BRAKING_SHARE: f64 = 0.9;
 #[derive(Debug, Clone, Copy)]
 pub struct Controller {
     law: Law,
+    pace: Pace,
     robot: RobotSheet,
     task: TaskSheet,
 }
@@ -39,8 +57,14 @@ pub struct Controller {
 impl Controller {
     /// A controller for one robot and task.
     #[must_use]
-    pub fn new(law: Law, robot: RobotSheet, task: TaskSheet) -> Self {
-        Self { law, robot, task }
+    pub fn new(law: Law, pace: Pace, robot: RobotSheet, task: TaskSheet) -> Self {
+        Self { law, pace, robot, task }
+    }
+
+    /// How fast it drives.
+    #[must_use]
+    pub fn pace(&self) -> Pace {
+        self.pace
     }
 
     /// The same with less of the drive's deceleration planned for, as a share of it: for floors on which tyres slide.
@@ -69,10 +93,14 @@ impl Controller {
         omega.clamp(-self.robot.max_turn_rate_rad_s, self.robot.max_turn_rate_rad_s)
     }
 
-    /// Twist that drives a robot at `pose` (home frame) home: cruising speed, less while it points far elsewhere, and no more than
+    /// Twist that drives a robot at `pose` (home frame) home. At a constant pace it is the printed law's; governed, cruising speed, less while it points far elsewhere, and no more than
     /// still lets it stop at home. It slows down late: an arc that begins at once beats a turn on the spot.
     #[must_use]
     pub fn drive(&self, pose: &Pose) -> Twist {
+        if let Pace::Constant { beta } = self.pace {
+            let v = self.task.speed_m_s;
+            return Twist { v, omega: printed::turn_rate(self.law, beta, v / self.task.arrival_radius_m, pose) };
+        }
         let range = pose.position().norm();
         let error = home_direction(pose);
         let cruise = self.task.speed_m_s.min(self.robot.max_speed_m_s);
@@ -107,6 +135,7 @@ mod tests {
     fn controller(law: Law) -> Controller {
         Controller::new(
             law,
+            Pace::Governed,
             RobotSheet {
                 track_m: 0.23,
                 camera_offset_m: [0.0; 2],

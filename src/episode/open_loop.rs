@@ -9,11 +9,16 @@ use std::path::Path;
 use serde::Serialize;
 use sha2::{Digest, Sha256};
 
+use super::parts::Parts;
+use super::setup::{PlantKind, Setup, Start};
+use super::simulation::Simulation;
 use super::summary::{CollisionRecord, PoseRecord};
 use crate::error::{Error, Result};
-use crate::geometry::{Pose, Twist, Vector2, wrap};
-use crate::physics::{Collision, FloorContact, Plant, RapierPlant};
+use crate::geometry::{Pose, Twist, wrap};
+use crate::observation::{Bearing, HomeSnapshot};
+use crate::physics::{Collision, Plant, WheelState};
 use crate::random::Seed;
+use crate::sensor::Sensor;
 use crate::world::World;
 
 /// Columns of a command table, in any order.
@@ -133,18 +138,12 @@ pub struct DriveStep {
     pub command: Twist,
     /// True pose in the room.
     pub truth: Pose,
-    /// True velocity of the middle of the axle, forward and leftward, m/s.
-    pub velocity_m_s: Vector2<f64>,
-    /// True yaw rate, rad/s.
-    pub yaw_rate_rad_s: f64,
     /// Pose that the odometry alone leads to, in the room, from the true start.
     pub dead_reckoned: Pose,
     /// Odometry of the interval.
     pub odometry: Twist,
-    /// True speeds of the left and right wheel, rad/s.
-    pub wheel_speeds_rad_s: [f64; 2],
-    /// Slip, forces and loads, means over the interval.
-    pub floor: FloorContact,
+    /// Velocity, wheel speeds, slip, forces and loads; the latter three are means over the interval.
+    pub wheels: WheelState,
     /// Collisions that began during the interval.
     pub collisions: u32,
 }
@@ -167,19 +166,12 @@ pub fn drive(world: &World, start: Pose, seed: Seed, commands: &Commands, watch:
             allowed: format!("{MOST_STEPS} control steps of {period_s} s at most"),
         });
     }
-    let mut plant = RapierPlant::new(world, start, seed);
-    let mut last = DriveStep {
-        time_s: 0.0,
-        command: Twist::default(),
-        truth: start,
-        velocity_m_s: Vector2::zeros(),
-        yaw_rate_rad_s: 0.0,
-        dead_reckoned: start,
-        odometry: Twist::default(),
-        wheel_speeds_rad_s: [0.0; 2],
-        floor: FloorContact { load_n: plant.chassis().loads(), ..FloorContact::default() },
-        collisions: 0,
-    };
+    let mut setup = Setup { start: Start::At(start), ..Setup::default() };
+    setup.time_limit_s = Some(f64::INFINITY);
+    let parts = Parts::with_sensor(world, PlantKind::Rapier, Box::new(Blind::default()));
+    let mut simulation = Simulation::from_parts(world, &setup, parts);
+    simulation.reset_at(seed.0, start)?;
+    let mut last = state(&simulation, 0.0, Twist::default());
     let mut summary = DriveSummary::new(&last, world, commands, seed);
     let mut watch = |step: &DriveStep, collisions: &[Collision]| match watch(step, collisions)? {
         ControlFlow::Break(()) => Err(Error::Interrupted),
@@ -187,25 +179,49 @@ pub fn drive(world: &World, start: Pose, seed: Seed, commands: &Commands, watch:
     };
     watch(&last, &[])?;
     for (time_s, length_s, command) in commands.intervals(period_s) {
-        let moved = plant.step(command, length_s);
-        let chassis = plant.chassis();
+        simulation.forget();
+        let odometry = simulation.step_for(command, Some(length_s))?.0.odometry;
         let step = DriveStep {
-            time_s,
-            command,
-            truth: plant.truth(),
-            velocity_m_s: chassis.axle_velocity(),
-            yaw_rate_rad_s: chassis.velocity().yaw_rate,
-            dead_reckoned: last.dead_reckoned.advanced(moved.odometry.twist, moved.odometry.dt_s),
-            odometry: moved.odometry.twist,
-            wheel_speeds_rad_s: chassis.wheel_speeds(),
-            floor: *plant.floor_contact(),
-            collisions: moved.collisions,
+            dead_reckoned: last.dead_reckoned.advanced(odometry.twist, odometry.dt_s),
+            odometry: odometry.twist,
+            ..state(&simulation, time_s, command)
         };
-        summary.add(&last, &step, plant.collisions(), world);
-        watch(&step, plant.collisions())?;
+        summary.add(&last, &step, simulation.collisions(), world);
+        watch(&step, simulation.collisions())?;
         last = step;
     }
     Ok(summary)
+}
+
+/// What is true now; the odometry is none, and what it alone leads to is the truth.
+fn state(simulation: &Simulation<'_>, time_s: f64, command: Twist) -> DriveStep {
+    DriveStep {
+        time_s,
+        command,
+        truth: simulation.truth(),
+        dead_reckoned: simulation.truth(),
+        odometry: Twist::default(),
+        wheels: simulation.plant().and_then(Plant::wheels).unwrap_or_default(),
+        collisions: simulation.collisions().len() as u32,
+    }
+}
+
+/// A robot that looks at nothing.
+#[derive(Default)]
+struct Blind(HomeSnapshot);
+
+impl Sensor for Blind {
+    fn reset(&mut self, _seed: Seed) -> Result<()> {
+        Ok(())
+    }
+
+    fn home(&self) -> &HomeSnapshot {
+        &self.0
+    }
+
+    fn observe(&mut self, _truth: Pose, _bodies: &[Pose]) -> Result<Vec<Bearing>> {
+        Ok(Vec::new())
+    }
 }
 
 /// A drive in numbers. Depends on the world, the commands, the start and the seed alone.
@@ -264,20 +280,20 @@ impl DriveSummary {
             world: world.spec.name.clone(),
             world_sha256: world.sha256.clone(),
             commands_sha256: commands.sha256.clone(),
-            version: crate::VERSION,
+            version: env!("CARGO_PKG_VERSION"),
         }
     }
 
     /// The drive has gone on to `step`.
     fn add(&mut self, before: &DriveStep, step: &DriveStep, collisions: &[Collision], world: &World) {
-        let [left, right] = step.floor.slip_m_s;
+        let [left, right] = step.wheels.floor.slip_m_s;
         self.time_s = step.time_s;
         self.end = step.truth.into();
         self.odometry_end = step.dead_reckoned.into();
         self.odometry_drift_m = (step.dead_reckoned.position() - step.truth.position()).norm();
         self.odometry_heading_drift_rad = wrap(step.dead_reckoned.heading - step.truth.heading);
         self.path_length_m += (step.truth.position() - before.truth.position()).norm();
-        self.greatest_speed_m_s = self.greatest_speed_m_s.max(step.velocity_m_s.norm());
+        self.greatest_speed_m_s = self.greatest_speed_m_s.max(step.wheels.velocity_m_s.norm());
         self.greatest_slip_m_s = self.greatest_slip_m_s.max(left.norm()).max(right.norm());
         self.collisions += collisions.len();
         let listed = collisions.len().min(MOST_LISTED - self.collision_list.len());

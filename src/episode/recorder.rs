@@ -1,6 +1,7 @@
 //! Watching an episode closely: every control step with all that belongs to it, as it happens.
 
-use super::record::Step;
+use super::record::{Record, Step};
+use super::summary::Summary;
 use crate::error::Result;
 use crate::geometry::Pose;
 use crate::observation::{Bearing, HomeSnapshot};
@@ -24,27 +25,46 @@ pub struct Moment<'a> {
 
 /// Keeps what happens in an episode, for example in a file. It is only told: nothing that it does changes the run, but an error
 /// ends it.
-pub trait Recorder {
+pub trait Recorder: Send {
     /// The episode begins: what was seen at home, and the panorama from there where the sensor has a camera.
     ///
     /// # Errors
     /// When it cannot be kept.
-    fn begin(&mut self, home: &HomeSnapshot, panorama: Option<&Panorama>) -> Result<()>;
+    fn begin(&mut self, home: &HomeSnapshot, panorama: Option<&Panorama>) -> Result<()> {
+        let _ = (home, panorama);
+        Ok(())
+    }
 
     /// A control step, in the order of time.
     ///
     /// # Errors
     /// When it cannot be kept.
-    fn record(&mut self, moment: &Moment<'_>) -> Result<()>;
-}
-
-/// Keeps nothing.
-impl Recorder for () {
-    fn begin(&mut self, _home: &HomeSnapshot, _panorama: Option<&Panorama>) -> Result<()> {
+    fn record(&mut self, moment: &Moment<'_>) -> Result<()> {
+        let _ = moment;
         Ok(())
     }
 
-    fn record(&mut self, _moment: &Moment<'_>) -> Result<()> {
+    /// The episode has ended. One that is interrupted or fails ends without it.
+    ///
+    /// # Errors
+    /// When what is left cannot be kept.
+    fn finish(&mut self, record: &Record, summary: &Summary) -> Result<()> {
+        let _ = (record, summary);
         Ok(())
+    }
+}
+
+/// Many at once, in their order.
+impl<R: Recorder + ?Sized> Recorder for Vec<Box<R>> {
+    fn begin(&mut self, home: &HomeSnapshot, panorama: Option<&Panorama>) -> Result<()> {
+        self.iter_mut().try_for_each(|recorder| recorder.begin(home, panorama))
+    }
+
+    fn record(&mut self, moment: &Moment<'_>) -> Result<()> {
+        self.iter_mut().try_for_each(|recorder| recorder.record(moment))
+    }
+
+    fn finish(&mut self, record: &Record, summary: &Summary) -> Result<()> {
+        self.iter_mut().try_for_each(|recorder| recorder.finish(record, summary))
     }
 }

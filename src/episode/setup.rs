@@ -1,32 +1,24 @@
-//! Choosing the parts of an episode and putting them together.
-
-use std::ops::ControlFlow;
-use std::sync::Arc;
+//! Choosing the parts of an episode.
 
 use serde::Serialize;
-use strum::{EnumMessage, IntoStaticStr, VariantArray};
+use strum::{Display, EnumMessage, IntoStaticStr, VariantArray};
 
-use super::record::Record;
-use super::recorder::Recorder;
-use super::run::{Parts, Progress, run_recorded};
+use crate::control::{Law, Pace};
 use crate::error::{Error, Result};
 use crate::estimation::anchored::FilterSettings;
+use crate::estimation::paper::PaperSettings;
 use crate::geometry::Pose;
-use crate::method::{self, LawKind, MethodKind};
+use crate::method::{MethodKind, MethodOptions};
 use crate::observation::{Briefing, CameraSheet, RobotSheet, TaskSheet};
 use crate::panorama::{Panorama, Projection};
-use crate::physics::{Plant, RapierPlant, UnicyclePlant};
 use crate::random::Seed;
-use crate::render::{self, Renderer, RendererChoice, Scene};
-use crate::sensor::{
-    CompassSensor, DatasetChoice, DatasetField, DatasetSensor, Degradation, DegradedSensor, IdealSensor, Noise, NoisySensor,
-    RenderedSensor, Sensor, Sight,
-};
+use crate::render::{RendererChoice, Scene};
+use crate::sensor::{DatasetChoice, Degradation, Noise, Sensor};
 use crate::vision::ExtractorSettings;
 use crate::world::{CameraPreset, LightPreset, OpticsSpec, TaskSpec, World};
 
 /// What moves when the wheels are commanded.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, EnumMessage, IntoStaticStr, VariantArray)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Display, EnumMessage, IntoStaticStr, VariantArray)]
 #[serde(rename_all = "kebab-case")]
 #[strum(serialize_all = "kebab-case")]
 pub enum PlantKind {
@@ -36,11 +28,11 @@ pub enum PlantKind {
     Unicycle,
 }
 
-/// Where bearings come from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, EnumMessage, IntoStaticStr, VariantArray)]
+/// Where bearings come from, by the names that the command line has for it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Display, EnumMessage, IntoStaticStr, VariantArray)]
 #[serde(rename_all = "kebab-case")]
 #[strum(serialize_all = "kebab-case")]
-pub enum Bearings {
+pub enum SensorKind {
     /// Features of rendered panoramas, found again from the home panorama.
     Rendered,
     /// True bearings of the landmark bodies' centres, where nothing hides them.
@@ -51,15 +43,25 @@ pub enum Bearings {
     Dataset,
 }
 
-impl Bearings {
-    /// Whether they are found in panoramas, which takes most of a run's time.
+impl SensorKind {
+    /// Whether bearings are found in panoramas, which takes most of a run's time.
     #[must_use]
-    pub fn are_seen(self) -> bool {
+    pub fn is_seeing(self) -> bool {
         matches!(self, Self::Rendered | Self::Dataset)
     }
 }
 
-/// Light and camera of [`Bearings::Rendered`]. What is `None` is as the world has it.
+/// When a run has come home.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum StopRule {
+    /// When the method claims it and the robot comes to rest within the arrival radius.
+    #[default]
+    Claim,
+    /// When the robot truly is within the arrival radius, whatever the method believes: the rule of the paper's simulations.
+    Reached,
+}
+
+/// Light and camera of [`SensorKind::Rendered`]. What is `None` is as the world has it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Look {
     /// Light.
@@ -117,27 +119,33 @@ pub struct Setup {
     /// What moves.
     pub plant: PlantKind,
     /// What senses.
-    pub bearings: Bearings,
+    pub sensor: SensorKind,
     /// What decides.
     pub method: MethodKind,
     /// How it steers.
-    pub law: LawKind,
+    pub law: Law,
+    /// How fast it drives; see [`MethodOptions::pace`].
+    pub pace: Pace,
     /// Knobs of the anchored filter; the track is the robot's, whatever they say.
     pub filter: FilterSettings,
-    /// What renders, for [`Bearings::Rendered`].
+    /// Knobs of the paper's filter.
+    pub paper: PaperSettings,
+    /// When a run has come home.
+    pub stop: StopRule,
+    /// What renders, for [`SensorKind::Rendered`].
     pub renderer: RendererChoice,
     /// Columns and rows of the panorama where they differ from the world's.
     pub size_px: Option<(u32, u32)>,
-    /// What makes bearings of panoramas, for [`Bearings::Rendered`].
+    /// What makes bearings of panoramas, for [`SensorKind::Rendered`].
     pub extractor: ExtractorSettings,
-    /// Light and camera, for [`Bearings::Rendered`].
+    /// Light and camera, for [`SensorKind::Rendered`].
     pub look: Look,
     /// Light and camera of the home panorama; what is `None` is as in `look`.
     pub home_look: Look,
-    /// The set of [`Bearings::Dataset`].
+    /// The set of [`SensorKind::Dataset`].
     pub dataset: Option<DatasetChoice>,
-    /// Faults of [`Bearings::Noisy`].
-    pub noise: Noise,
+    /// Faults of [`SensorKind::Noisy`]; `None` for the usual ones.
+    pub noise: Option<Noise>,
     /// What is done to the bearings of any sensor on top of that.
     pub degradation: Degradation,
     /// Standard deviation of the readings of the robot's compass, rad; `None` for a robot without one. Methods that
@@ -157,17 +165,20 @@ impl Default for Setup {
     fn default() -> Self {
         Self {
             plant: PlantKind::Rapier,
-            bearings: Bearings::Rendered,
+            sensor: SensorKind::Rendered,
             method: MethodKind::AnchoredEkf,
-            law: LawKind::Proportional,
+            law: Law::Proportional,
+            pace: Pace::Governed,
             filter: FilterSettings::default(),
+            paper: PaperSettings::default(),
+            stop: StopRule::Claim,
             renderer: RendererChoice::Auto,
             size_px: None,
             extractor: ExtractorSettings::default(),
             look: Look::default(),
             home_look: Look::default(),
             dataset: None,
-            noise: Noise::default(),
+            noise: None,
             degradation: Degradation::default(),
             compass_sd_rad: None,
             start: Start::Random,
@@ -196,6 +207,69 @@ impl Setup {
     #[must_use]
     pub fn looks(&self) -> [Look; 2] {
         [self.home_look.or(self.look), self.look]
+    }
+
+    /// Refuses what would do nothing, and numbers out of their range.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] that names a setting, what it goes with, and what was chosen.
+    pub fn check(&self) -> Result<()> {
+        use SensorKind::{Dataset, Noisy, Rendered};
+        let goes_with = |given: bool, what: &str, kinds: &[SensorKind]| {
+            if !given || kinds.contains(&self.sensor) {
+                return Ok(());
+            }
+            let name = |kind: &SensorKind| format!("--bearings {kind}");
+            let allowed = kinds.iter().map(name).collect::<Vec<_>>().join(" or ");
+            Err(Error::Invalid { what: format!("sensor for {what}"), found: name(&self.sensor), allowed })
+        };
+        goes_with(self.noise.is_some(), "--noise-*", &[Noisy])?;
+        goes_with(self.size_px.is_some(), "--size", &[Rendered])?;
+        goes_with(self.look.or(self.home_look) != Look::default(), "--light and --camera", &[Rendered])?;
+        goes_with(
+            self.extractor != ExtractorSettings::default(),
+            "--landmarks and other settings of the extractor",
+            &[Rendered, Dataset],
+        )?;
+        goes_with(self.dataset.is_some(), "--dataset*", &[Dataset])?;
+        let invalid = |what: &str, found: String, allowed: &str| {
+            Err(Error::Invalid { what: what.into(), found, allowed: allowed.into() })
+        };
+        if self.sensor == Dataset && self.dataset.is_none() {
+            return invalid("set for --bearings dataset", "none".into(), "the folder of one, with `--dataset DIR`");
+        }
+        if self.method != MethodKind::PaperEkf && (self.initial_estimate.is_some() || self.told_start) {
+            return invalid("initial estimate", "one".into(), "none: only paper-ekf is started from a supposed pose");
+        }
+        let share = |what: &str, value: f64| {
+            if (0.0..=1.0).contains(&value) { Ok(()) } else { invalid(what, value.to_string(), "0 to 1") }
+        };
+        let deviation = |what: &str, value: f64| {
+            if value >= 0.0 && value.is_finite() { Ok(()) } else { invalid(what, format!("{value} rad"), "0 or more") }
+        };
+        let noise = self.noise.unwrap_or_default();
+        deviation("noise of bearings", noise.sd_rad)?;
+        share("share of bearings that drop out", noise.dropout)?;
+        share("share of bearings that are false", noise.false_match)?;
+        deviation("noise of the compass", self.compass_sd_rad.unwrap_or(0.0))?;
+        self.degradation.check()?;
+        if self.time_limit_s.is_some_and(|limit| !(limit > 0.0 && limit.is_finite())) {
+            return invalid("time limit", format!("{} s", self.time_limit_s.unwrap_or_default()), "more than 0");
+        }
+        self.method.check()
+    }
+
+    /// What the method is set to in a run from `start` (in the room).
+    #[must_use]
+    pub fn method_options(&self, world: &World, start: &Pose) -> MethodOptions {
+        MethodOptions {
+            law: self.law,
+            pace: self.pace,
+            filter: self.filter,
+            paper: self.paper,
+            initial: if self.told_start { Some(world.home.to_local(start)) } else { self.initial_estimate },
+            stops: self.stop == StopRule::Claim,
+        }
     }
 
     /// What a method is told before a run.
@@ -227,168 +301,6 @@ impl Setup {
             allowed: format!("a place in world `{}` where the robot can stand", world.spec.name),
         })?;
         Ok(pose)
-    }
-}
-
-/// A world made ready to run episodes of one setup on it, one after the other.
-pub struct Bench<'a> {
-    world: &'a World,
-    setup: &'a Setup,
-    camera: Option<Camera>,
-    dataset: Option<Arc<DatasetField>>,
-}
-
-/// What rendered bearings need, kept from run to run.
-struct Camera {
-    /// The scene as it was at home, and as it is on the way.
-    scenes: [Arc<Scene>; 2],
-    renderer: Box<dyn Renderer>,
-}
-
-impl<'a> Bench<'a> {
-    /// Packs the world and opens the renderer where the setup needs them.
-    ///
-    /// # Errors
-    /// When the method's program is not there, the world cannot be packed, the renderer cannot be had, or the set cannot be opened.
-    pub fn new(world: &'a World, setup: &'a Setup) -> Result<Self> {
-        setup.method.check()?;
-        let camera = match setup.bearings {
-            Bearings::Rendered => {
-                let scene = Scene::new(world)?;
-                let scenes = setup.looks().map(|look| Arc::new(look.scene(&scene, world)));
-                Some(Camera { scenes, renderer: render::create(setup.renderer)? })
-            }
-            Bearings::Ideal | Bearings::Noisy | Bearings::Dataset => None,
-        };
-        let dataset = field(world, setup)?;
-        Ok(Self { world, setup, camera, dataset })
-    }
-
-    /// The packed world as it was at home and as it is on the way; `None` for a sensor without a camera.
-    #[must_use]
-    pub fn scenes(&self) -> Option<[Arc<Scene>; 2]> {
-        self.camera.as_ref().map(|camera| camera.scenes.clone())
-    }
-
-    /// As [`Bench::new`], with the scenes of another bench on an equal world with the same [`Setup::looks`]: packing a world, its
-    /// textures above all, takes longer than a short run.
-    ///
-    /// # Errors
-    /// When the renderer cannot be had, or the set cannot be opened.
-    pub fn with_scenes(world: &'a World, setup: &'a Setup, scenes: [Arc<Scene>; 2]) -> Result<Self> {
-        let camera = match setup.bearings {
-            Bearings::Rendered => Some(Camera { scenes, renderer: render::create(setup.renderer)? }),
-            Bearings::Ideal | Bearings::Noisy | Bearings::Dataset => None,
-        };
-        let dataset = field(world, setup)?;
-        Ok(Self { world, setup, camera, dataset })
-    }
-
-    /// A second bench for another thread; it shares the packed world and has a renderer of its own.
-    ///
-    /// # Errors
-    /// When a second renderer cannot be had.
-    pub fn another(&self) -> Result<Self> {
-        let camera = match &self.camera {
-            Some(camera) => Some(Camera { scenes: camera.scenes.clone(), renderer: render::create(self.setup.renderer)? }),
-            None => None,
-        };
-        Ok(Self { camera, dataset: self.dataset.clone(), ..*self })
-    }
-
-    /// Runs the episode of one seed. `watch` is called once a control step and stops the run with `Break`.
-    ///
-    /// # Errors
-    /// When there is no such start, the method cannot be built from what the setup gives it, the renderer fails, or `watch`
-    /// breaks.
-    pub fn run(&mut self, seed: u64, watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>) -> Result<Record> {
-        self.run_recorded(seed, watch, &mut ())
-    }
-
-    /// [`Bench::run`], with a recorder that is told of every control step.
-    ///
-    /// # Errors
-    /// As [`Bench::run`], and what the recorder fails with.
-    pub fn run_recorded(
-        &mut self,
-        seed: u64,
-        watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
-        recorder: &mut dyn Recorder,
-    ) -> Result<Record> {
-        let start = self.setup.start_pose(self.world, Seed(seed))?;
-        self.run_parts(seed, start, watch, recorder)
-    }
-
-    /// Runs the episode of one seed from a pose in the room, whatever start the setup names.
-    ///
-    /// # Errors
-    /// As [`Bench::run`].
-    pub fn run_from(&mut self, seed: u64, start: Pose, watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>) -> Result<Record> {
-        self.run_parts(seed, start, watch, &mut ())
-    }
-
-    fn run_parts(
-        &mut self,
-        seed: u64,
-        start: Pose,
-        watch: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
-        recorder: &mut dyn Recorder,
-    ) -> Result<Record> {
-        let (world, setup, seed) = (self.world, self.setup, Seed(seed));
-        let mut plant: Box<dyn Plant> = match setup.plant {
-            PlantKind::Rapier => Box::new(RapierPlant::new(world, start, seed)),
-            PlantKind::Unicycle => Box::new(UnicyclePlant::new(world, start, seed)),
-        };
-        let mut sensor = self.sensor(seed)?;
-        let task = setup.task(world);
-        let briefing = setup.briefing(world, sensor.as_ref());
-        let initial = if setup.told_start { Some(world.home.to_local(&start)) } else { setup.initial_estimate };
-        let mut method = method::build(setup.method.clone(), setup.law, setup.filter, briefing, initial)?;
-        let parts = Parts { plant: plant.as_mut(), sensor: sensor.as_mut(), method: method.as_mut() };
-        run_recorded(parts, world.home, &task, watch, recorder)
-    }
-
-    /// The setup's sensor for the run of one seed.
-    ///
-    /// # Errors
-    /// When the renderer fails or the setup asks for faults that cannot be.
-    pub fn sensor(&mut self, seed: Seed) -> Result<Box<dyn Sensor + '_>> {
-        let (world, setup) = (self.world, self.setup);
-        let ideal = || IdealSensor::new(world);
-        let mut sensor: Box<dyn Sensor + '_> = match (&mut self.camera, &self.dataset) {
-            (Some(Camera { scenes: [home, now], renderer }), _) => {
-                let [home_look, look] = setup.looks();
-                let sights =
-                    [Sight { scene: home, optics: home_look.optics(world) }, Sight { scene: now, optics: look.optics(world) }];
-                let (projection, settings) = (setup.projection(world), setup.extractor.clone());
-                Box::new(RenderedSensor::new(world, sights, renderer.as_mut(), projection, settings, seed)?)
-            }
-            (None, Some(field)) => Box::new(DatasetSensor::new(world, Arc::clone(field), setup.extractor.clone())),
-            (None, None) if setup.bearings == Bearings::Noisy => {
-                Box::new(NoisySensor::new(ideal(), world.landmark_count, setup.noise, seed))
-            }
-            (None, None) => Box::new(ideal()),
-        };
-        if !setup.degradation.is_none() {
-            sensor = Box::new(DegradedSensor::new(sensor, setup.degradation, seed)?);
-        }
-        if let Some(sd_rad) = setup.compass_sd_rad {
-            sensor = Box::new(CompassSensor::new(sensor, world.home, sd_rad, seed)?);
-        }
-        Ok(sensor)
-    }
-}
-
-/// The set that bearings come from, where they come from one.
-fn field(world: &World, setup: &Setup) -> Result<Option<Arc<DatasetField>>> {
-    match (setup.bearings, &setup.dataset) {
-        (Bearings::Dataset, Some(choice)) => Ok(Some(Arc::new(DatasetField::new(world, choice)?))),
-        (Bearings::Dataset, None) => Err(Error::Invalid {
-            what: "set for --bearings dataset".into(),
-            found: "none".into(),
-            allowed: "the folder of one, with `home --dataset DIR`".into(),
-        }),
-        _ => Ok(None),
     }
 }
 

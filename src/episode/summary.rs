@@ -4,9 +4,10 @@ use nalgebra::{Cholesky, Vector3};
 use serde::Serialize;
 
 use super::record::{Outcome, Record, Step, Timing};
-use super::setup::{Bearings, PlantKind, Setup};
+use super::setup::{PlantKind, SensorKind, Setup};
+use crate::control::Law;
 use crate::geometry::{Pose, angle_of, wrap};
-use crate::method::{LawKind, MethodKind};
+use crate::method::MethodKind;
 use crate::observation::Estimate;
 use crate::physics::Collision;
 use crate::render::RendererInfo;
@@ -112,11 +113,11 @@ pub struct SetupRecord {
     /// Plant.
     pub plant: PlantKind,
     /// Sensor of bearings.
-    pub bearings: Bearings,
+    pub bearings: SensorKind,
     /// Homing method.
     pub method: MethodKind,
     /// Steering law.
-    pub controller: LawKind,
+    pub controller: Law,
     /// Standard deviation of the compass, rad; left out for a robot without one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub compass_sd_rad: Option<f64>,
@@ -140,10 +141,10 @@ impl SetupRecord {
     pub fn new(setup: &Setup, world: &World) -> Self {
         let task = setup.task(world);
         let projection = setup.projection(world);
-        let rendered = setup.bearings == Bearings::Rendered;
+        let rendered = setup.sensor == SensorKind::Rendered;
         Self {
             plant: setup.plant,
-            bearings: setup.bearings,
+            bearings: setup.sensor,
             method: setup.method.clone(),
             controller: setup.law,
             compass_sd_rad: setup.compass_sd_rad,
@@ -236,7 +237,7 @@ impl Summary {
             seed,
             world: world.spec.name.clone(),
             world_sha256: world.sha256.clone(),
-            version: crate::VERSION,
+            version: env!("CARGO_PKG_VERSION"),
         }
     }
 

@@ -1,7 +1,7 @@
 //! The homing methods: an estimator or a direct law, joined to a controller, behind the [`Method`] trait.
 //!
-//! Everything here sees a [`Briefing`] and [`Observation`]s only. The one number a person may add is `initial`, the pose that
-//! the paper's filter is started from, because that filter cannot start from nothing.
+//! Everything here sees a [`Briefing`] and [`Observation`]s only. The one number a person may add is the pose that the paper's
+//! filter is started from, because that filter cannot start from nothing.
 
 pub mod exec;
 mod paper;
@@ -11,17 +11,19 @@ use std::fmt;
 use std::str::FromStr;
 
 use serde::{Serialize, Serializer};
-use strum::{EnumMessage, IntoStaticStr, VariantArray};
+use strum::{EnumMessage, IntoStaticStr};
 
 use crate::control::escape::Escape;
 use crate::control::vectors::VectorLaw;
-use crate::control::{Controller, Law};
+use crate::control::{Controller, Law, Pace};
 use crate::error::{Error, Result};
 use crate::estimation::anchored::{AnchoredFilter, FilterSettings};
+use crate::estimation::paper::PaperSettings;
 use crate::geometry::{Pose, Twist, wrap};
 use crate::observation::{Briefing, Decision, Estimate, Method, Observation, RobotSheet, Status};
 use exec::{ExecCommand, ExecHoming};
 use paper::PaperHoming;
+pub use paper::untold;
 use vector::VectorHoming;
 
 /// Homing methods by name. A method is read from its name and shown by it: `alv`, or `exec:python3 my_method.py`.
@@ -78,6 +80,17 @@ impl MethodKind {
     }
 }
 
+impl From<VectorLaw> for MethodKind {
+    fn from(law: VectorLaw) -> Self {
+        match law {
+            VectorLaw::Alv => Self::Alv,
+            VectorLaw::TronDaniilidis => Self::TronDaniilidis,
+            VectorLaw::Weber => Self::Weber,
+            VectorLaw::Ibvs => Self::Ibvs,
+        }
+    }
+}
+
 impl fmt::Display for MethodKind {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -108,35 +121,42 @@ impl Serialize for MethodKind {
     }
 }
 
-/// Control laws by name.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, EnumMessage, IntoStaticStr, VariantArray)]
-#[serde(rename_all = "kebab-case")]
-#[strum(serialize_all = "kebab-case")]
-pub enum LawKind {
-    /// Turn rate proportional to the heading error.
-    Proportional,
-    /// The paper's switching law, omega = beta (v / Rc) sgn(theta').
-    Lyapunov,
+/// What methods are set to, beside what the robot knows.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MethodOptions {
+    /// How it steers.
+    pub law: Law,
+    /// How fast it drives: of homing vectors and of `paper-ekf`, which drives at the paper's constant pace anyway.
+    pub pace: Pace,
+    /// Knobs of the anchored filter.
+    pub filter: FilterSettings,
+    /// Knobs of the paper's filter.
+    pub paper: PaperSettings,
+    /// Pose in the home frame that `paper-ekf` is started from.
+    pub initial: Option<Pose>,
+    /// Whether `paper-ekf` stops where it believes to be home.
+    pub stops: bool,
 }
 
-/// Builds a method. `filter` is for `anchored-ekf`; `initial` is the pose in the home frame that `paper-ekf` is started from;
-/// others must not get one.
+impl Default for MethodOptions {
+    fn default() -> Self {
+        Self {
+            law: Law::Proportional,
+            pace: Pace::Governed,
+            filter: FilterSettings::default(),
+            paper: PaperSettings::default(),
+            initial: None,
+            stops: true,
+        }
+    }
+}
+
+/// Builds a method.
 ///
 /// # Errors
-/// When the method needs more of the home snapshot than there is, or `initial` is given to a method that takes none.
-pub fn build(
-    kind: MethodKind,
-    law: LawKind,
-    filter: FilterSettings,
-    briefing: Briefing,
-    initial: Option<Pose>,
-) -> Result<Box<dyn Method>> {
-    let law = match law {
-        LawKind::Proportional => Law::Proportional,
-        LawKind::Lyapunov => Law::Lyapunov,
-    };
-    let controller = Controller::new(law, briefing.robot, briefing.task);
-    if initial.is_some() && kind != MethodKind::PaperEkf {
+/// When the method needs more of the home snapshot than there is, or a supposed pose is given to a method that takes none.
+pub fn build(kind: MethodKind, options: &MethodOptions, briefing: Briefing) -> Result<Box<dyn Method>> {
+    if options.initial.is_some() && kind != MethodKind::PaperEkf {
         return Err(Error::Invalid {
             what: "initial estimate".into(),
             found: "one".into(),
@@ -151,14 +171,15 @@ pub fn build(
             allowed: format!("at least {least}"),
         });
     }
-    let vector = |law, briefing| Box::new(VectorHoming::new(law, controller, briefing));
+    let controller = |pace| Controller::new(options.law, pace, briefing.robot, briefing.task);
+    let vector = |law, briefing| Box::new(VectorHoming::new(law, controller(options.pace), briefing));
     Ok(match kind {
-        MethodKind::AnchoredEkf => Box::new(AnchoredHoming::new(filter, controller, &briefing)),
-        MethodKind::PaperEkf => Box::new(PaperHoming::new(controller, briefing, initial)),
-        MethodKind::Alv => vector(VectorLaw::Alv, briefing),
-        MethodKind::TronDaniilidis => vector(VectorLaw::TronDaniilidis, briefing),
-        MethodKind::Weber => vector(VectorLaw::Weber, briefing),
-        MethodKind::Ibvs => vector(VectorLaw::Ibvs, briefing),
+        MethodKind::AnchoredEkf => Box::new(AnchoredHoming::new(options.filter, controller(Pace::Governed), &briefing)),
+        MethodKind::PaperEkf => Box::new(PaperHoming::new(options, briefing)),
+        MethodKind::Alv => vector(VectorLaw::Alv, briefing.clone()),
+        MethodKind::TronDaniilidis => vector(VectorLaw::TronDaniilidis, briefing.clone()),
+        MethodKind::Weber => vector(VectorLaw::Weber, briefing.clone()),
+        MethodKind::Ibvs => vector(VectorLaw::Ibvs, briefing.clone()),
         MethodKind::Exec(command) => Box::new(ExecHoming::new(command, briefing)),
     })
 }

@@ -1,11 +1,11 @@
 //! The laws that steer by a homing vector, as a method.
 
-use crate::control::Controller;
 use crate::control::vectors::{VectorLaw, align};
+use crate::control::{Controller, Pace};
 use crate::geometry::{Twist, angle_of};
 use crate::observation::{Briefing, Decision, Method, Observation, Status};
 
-/// A homing vector with a controller. With a compass its heading is used; without one the two bearing sets are aligned by their
+/// A homing vector with a controller, which knows where home is and stops there only at a governed pace. With a compass its heading is used; without one the two bearing sets are aligned by their
 /// circular mean difference.
 pub(super) struct VectorHoming {
     law: VectorLaw,
@@ -35,24 +35,22 @@ impl Method for VectorHoming {
                 Some((home.azimuth_rad, now.azimuth_rad))
             })
             .collect();
-        let idle = Decision {
-            command: Twist { v: 0.0, omega: 0.6 },
-            estimate: None,
-            status: Status::Running,
-            matched: pairs.len(),
-            rejected: 0,
-            nis: f64::NAN,
-        };
-        if pairs.len() < 2 {
+        let idle = Decision { matched: pairs.len(), ..Decision::command(Twist { v: 0.0, omega: 0.6 }) };
+        let governed = self.controller.pace() == Pace::Governed;
+        if governed && pairs.len() < 2 {
             return idle;
         }
         let heading = observation.compass_rad.unwrap_or_else(|| align(&pairs));
         let pairs: Vec<(f64, f64)> = pairs.into_iter().map(|(home, now)| (home, now + heading)).collect();
+        let towards = angle_of(self.law.vector(&pairs)) - heading;
+        if !governed {
+            return Decision { command: self.controller.follow(towards), ..idle };
+        }
         let difference = VectorLaw::Alv.vector(&pairs).norm();
         if difference < AT_HOME {
             return Decision { command: Twist::default(), status: Status::Arrived, ..idle };
         }
-        let mut command = self.controller.follow(angle_of(self.law.vector(&pairs)) - heading);
+        let mut command = self.controller.follow(towards);
         command.v *= (difference / NEAR_HOME).min(1.0);
         Decision { command, ..idle }
     }

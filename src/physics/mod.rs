@@ -130,6 +130,24 @@ pub trait Plant: Send {
     fn collisions(&self) -> &[Collision] {
         &[]
     }
+
+    /// What wheels and floor do; `None` for a plant without wheels.
+    fn wheels(&self) -> Option<WheelState> {
+        None
+    }
+}
+
+/// Motion of a robot and of its wheels, and what passes between them and the floor. For the record, never for a method.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct WheelState {
+    /// True velocity of the middle of the axle, forward and leftward, m/s.
+    pub velocity_m_s: Vector2<f64>,
+    /// True yaw rate, rad/s.
+    pub yaw_rate_rad_s: f64,
+    /// True speeds of the left and right wheel, rad/s.
+    pub wheel_speeds_rad_s: [f64; 2],
+    /// Slip, forces and loads, means over the last interval.
+    pub floor: FloorContact,
 }
 
 /// The command as a plant takes it: a command that is not finite is a stop.

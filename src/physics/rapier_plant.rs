@@ -9,7 +9,7 @@ use super::motor::WheelDrive;
 use super::movers::{Movers, Walkway};
 use super::script::{Event, Script};
 use super::vicinity::{Near, Scene, Vicinity};
-use super::{Collision, Plant, PlantStep, Struck, Touched};
+use super::{Collision, Plant, PlantStep, Struck, Touched, WheelState};
 use crate::geometry::{Pose, Twist, Vector2};
 use crate::random::Seed;
 use crate::world::polygon::contains;
@@ -78,6 +78,7 @@ impl RapierPlant {
     pub fn new(world: &World, start: Pose, seed: Seed) -> Self {
         let robot = &world.spec.robot;
         let chassis = Chassis::new(robot, start);
+        let floor_contact = FloorContact { load_n: chassis.loads(), ..FloorContact::default() };
         Self {
             hull: Hull::new(world),
             arena: Arena::new(world, start, chassis.yaw_inertia()),
@@ -98,7 +99,7 @@ impl RapierPlant {
             radius: robot.radius_m,
             substep_s: SUBSTEP_S,
             clock_s: 0.0,
-            floor_contact: FloorContact::default(),
+            floor_contact,
             collisions: Vec::new(),
         }
     }
@@ -253,6 +254,15 @@ impl Plant for RapierPlant {
 
     fn collisions(&self) -> &[Collision] {
         &self.collisions
+    }
+
+    fn wheels(&self) -> Option<WheelState> {
+        Some(WheelState {
+            velocity_m_s: self.chassis.axle_velocity(),
+            yaw_rate_rad_s: self.chassis.velocity().yaw_rate,
+            wheel_speeds_rad_s: self.chassis.wheel_speeds(),
+            floor: self.floor_contact,
+        })
     }
 }
 

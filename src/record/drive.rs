@@ -159,8 +159,8 @@ impl Trail {
 /// The numbers of one state in the order of [`COLUMNS`].
 fn row(step: &DriveStep) -> [f64; 33] {
     let s = step;
-    let [slip_left, slip_right] = s.floor.slip_m_s;
-    let [left, right, caster] = s.floor.force_n;
+    let [slip_left, slip_right] = s.wheels.floor.slip_m_s;
+    let [left, right, caster] = s.wheels.floor.force_n;
     let error = s.dead_reckoned.position() - s.truth.position();
     [
         s.time_s,
@@ -169,16 +169,16 @@ fn row(step: &DriveStep) -> [f64; 33] {
         s.truth.x,
         s.truth.y,
         s.truth.heading,
-        s.velocity_m_s.x,
-        s.velocity_m_s.y,
-        s.yaw_rate_rad_s,
+        s.wheels.velocity_m_s.x,
+        s.wheels.velocity_m_s.y,
+        s.wheels.yaw_rate_rad_s,
         s.dead_reckoned.x,
         s.dead_reckoned.y,
         s.dead_reckoned.heading,
         s.odometry.v,
         s.odometry.omega,
-        s.wheel_speeds_rad_s[0],
-        s.wheel_speeds_rad_s[1],
+        s.wheels.wheel_speeds_rad_s[0],
+        s.wheels.wheel_speeds_rad_s[1],
         slip_left.x,
         slip_left.y,
         slip_right.x,
@@ -189,9 +189,9 @@ fn row(step: &DriveStep) -> [f64; 33] {
         right.y,
         caster.x,
         caster.y,
-        s.floor.load_n[0],
-        s.floor.load_n[1],
-        s.floor.load_n[2],
+        s.wheels.floor.load_n[0],
+        s.wheels.floor.load_n[1],
+        s.wheels.floor.load_n[2],
         f64::from(s.collisions),
         error.x,
         error.y,

@@ -18,7 +18,7 @@ mod video;
 
 use std::path::{Path, PathBuf};
 
-use crate::episode::{Moment, Recorder, Summary};
+use crate::episode::{Moment, Record, Recorder, Summary};
 use crate::error::{Error, Result};
 use crate::observation::HomeSnapshot;
 use crate::panorama::Panorama;
@@ -58,7 +58,7 @@ impl RecordingPaths {
     }
 }
 
-/// The recordings of a run. Dropped before [`Recordings::finish`] they leave nothing.
+/// The recordings of a run. Those of a run that does not come to its end leave nothing.
 pub struct Recordings<'a> {
     mcap: Option<McapRecording<'a>>,
     video: Option<VideoRecording<'a>>,
@@ -75,17 +75,6 @@ impl<'a> Recordings<'a> {
             video: paths.video.as_deref().map(|path| VideoRecording::create(world, path)).transpose()?,
         })
     }
-
-    /// Ends them and gives the files their names.
-    ///
-    /// # Errors
-    /// When what is left cannot be written.
-    pub fn finish(self, summary: &Summary) -> Result<()> {
-        if let Some(mcap) = self.mcap {
-            mcap.finish(summary)?;
-        }
-        self.video.map_or(Ok(()), VideoRecording::finish)
-    }
 }
 
 impl Recorder for Recordings<'_> {
@@ -101,5 +90,12 @@ impl Recorder for Recordings<'_> {
             mcap.record(moment)?;
         }
         self.video.as_mut().map_or(Ok(()), |video| video.record(moment))
+    }
+
+    fn finish(&mut self, _record: &Record, summary: &Summary) -> Result<()> {
+        if let Some(mcap) = self.mcap.take() {
+            mcap.finish(summary)?;
+        }
+        self.video.take().map_or(Ok(()), VideoRecording::finish)
     }
 }

@@ -1,15 +1,17 @@
 //! The files of one run.
 
+use std::path::Path;
+
 use super::path_plot::path_svg;
 use super::tum;
 use crate::draw::image::colours_png;
-use crate::episode::{Belief, Record, Step, Summary};
+use crate::episode::{Belief, Record, Recorder, Step, Summary};
 use crate::error::Result;
 use crate::storage::{OutputFolder, json};
 use crate::world::World;
 
 /// Names of all files of a run; those of panoramas are there when the sensor has a camera, that of estimates when the method has any.
-pub const FILES: &[&str] = &[
+const FILES: &[&str] = &[
     "summary.json",
     "trajectory.csv",
     "trajectory.tum",
@@ -45,11 +47,29 @@ const COLUMNS: [&str; 20] = [
     "belief",
 ];
 
-/// Writes all files of a run.
-///
-/// # Errors
-/// When a file cannot be written.
-pub fn write(mut folder: OutputFolder, world: &World, record: &Record, summary: &Summary) -> Result<()> {
+/// Writes all files of a run into a folder when it has ended.
+pub struct RunFiles<'a> {
+    world: &'a World,
+    folder: Option<OutputFolder>,
+}
+
+impl<'a> RunFiles<'a> {
+    /// Opens the folder `path` for the files of a run in `world`; `verb` is what writes it.
+    ///
+    /// # Errors
+    /// As [`OutputFolder::open`].
+    pub fn open(path: &Path, verb: &str, world: &'a World) -> Result<Self> {
+        Ok(Self { world, folder: Some(OutputFolder::open(path, verb, FILES)?) })
+    }
+}
+
+impl Recorder for RunFiles<'_> {
+    fn finish(&mut self, record: &Record, summary: &Summary) -> Result<()> {
+        self.folder.take().map_or(Ok(()), |folder| write(folder, self.world, record, summary))
+    }
+}
+
+fn write(mut folder: OutputFolder, world: &World, record: &Record, summary: &Summary) -> Result<()> {
     let pictures = &record.pictures;
     for (name, picture) in
         [("home.png", &pictures.home), ("panorama_start.png", &pictures.start), ("panorama_end.png", &pictures.end)]

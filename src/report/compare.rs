@@ -5,11 +5,12 @@ use std::fmt::Write;
 use serde::Serialize;
 use svg::node::element::{Group, Line, Rectangle, Text};
 
+use crate::control::Law;
 use crate::draw::map::MapDrawing;
 use crate::episode::Outcome;
 use crate::error::Result;
 use crate::geometry::Vector2;
-use crate::method::{LawKind, MethodKind};
+use crate::method::MethodKind;
 use crate::storage::OutputFolder;
 use crate::study::compare::{Comparison, Contender, Standing};
 use crate::study::seeds::Spread;
@@ -70,8 +71,8 @@ fn told(contender: &Contender) -> &'static str {
 
 fn law(contender: &Contender) -> &'static str {
     match contender.law {
-        LawKind::Proportional => "proportional",
-        LawKind::Lyapunov => "lyapunov",
+        Law::Proportional => "proportional",
+        Law::Lyapunov => "lyapunov",
     }
 }
 

@@ -204,14 +204,14 @@ fn name(part: &impl Serialize) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::episode::{Bearings, Setup};
+    use crate::episode::{SensorKind, Setup};
     use crate::study::robustness::run;
     use crate::world::World;
 
     #[test]
     fn files_tell_the_same_story() {
         let world = World::open("lab").unwrap();
-        let setup = Setup { bearings: Bearings::Ideal, time_limit_s: Some(0.5), ..Setup::default() };
+        let setup = Setup { sensor: SensorKind::Ideal, time_limit_s: Some(0.5), ..Setup::default() };
         let study = run(&world, &setup, &Axis::ALL, &(1..=2), 1, &|_| std::ops::ControlFlow::Continue(())).unwrap();
         let command = "wayhome robustness lab --seeds 1..2";
         let (table, text, picture) = (csv(&study), readme(&study, command), panels::svg(&study));

@@ -21,7 +21,7 @@ impl<'a> CompassSensor<'a> {
     ///
     /// # Errors
     /// When the standard deviation is negative or not finite.
-    pub fn new(sensor: Box<dyn Sensor + 'a>, home: Pose, sd_rad: f64, seed: Seed) -> Result<Self> {
+    pub fn new(sensor: Box<dyn Sensor + 'a>, home: Pose, sd_rad: f64) -> Result<Self> {
         if !(sd_rad >= 0.0 && sd_rad.is_finite()) {
             return Err(Error::Invalid {
                 what: "noise of the compass".into(),
@@ -29,11 +29,21 @@ impl<'a> CompassSensor<'a> {
                 allowed: "0 or more".into(),
             });
         }
-        Ok(Self { sensor, home, sd_rad, noise: seed.stream("compass") })
+        Ok(Self { sensor, home, sd_rad, noise: compass_noise(Seed(0)) })
     }
 }
 
+/// The noise of the readings in a run of `seed`.
+fn compass_noise(seed: Seed) -> Stream {
+    seed.stream("compass")
+}
+
 impl Sensor for CompassSensor<'_> {
+    fn reset(&mut self, seed: Seed) -> Result<()> {
+        self.noise = compass_noise(seed);
+        self.sensor.reset(seed)
+    }
+
     fn home(&self) -> &HomeSnapshot {
         self.sensor.home()
     }

@@ -11,6 +11,7 @@ use crate::geometry::{Pose, wrap};
 use crate::observation::{Bearing, HomeSnapshot, LandmarkId};
 use crate::panorama::Panorama;
 use crate::panorama_set::{Grid, PanoramaSet, Place};
+use crate::random::Seed;
 use crate::vision::{Extractor, ExtractorSettings};
 use crate::world::World;
 
@@ -197,6 +198,11 @@ impl DatasetSensor {
 }
 
 impl Sensor for DatasetSensor {
+    fn reset(&mut self, _seed: Seed) -> Result<()> {
+        (self.last, self.timing) = (None, SensorTiming::default());
+        Ok(())
+    }
+
     fn home(&self) -> &HomeSnapshot {
         &self.home
     }

@@ -73,24 +73,15 @@ impl<'a> DegradedSensor<'a> {
     ///
     /// # Errors
     /// When a value of the degradation is out of its range.
-    pub fn new(sensor: Box<dyn Sensor + 'a>, degradation: Degradation, seed: Seed) -> Result<Self> {
+    pub fn new(sensor: Box<dyn Sensor + 'a>, degradation: Degradation) -> Result<Self> {
         degradation.check()?;
-        let seed = seed.derive("degraded");
-        let mut home = sensor.home().clone();
-        let mut at_home = seed.stream("noise-home");
-        for bearing in &mut home.bearings {
-            *bearing = blurred(*bearing, degradation.noise_sd_rad, standard_normal(&mut at_home));
-        }
-        let mut keys: Vec<f64> = home.bearings.iter().map(|b| hiding_key(seed, b.id)).collect();
-        keys.sort_by(f64::total_cmp);
-        let count = libm::round(degradation.hidden * keys.len() as f64) as usize;
-        let hidden_up_to = count.checked_sub(1).and_then(|last| keys.get(last)).copied().unwrap_or(-1.0);
+        let seed = Seed(0);
         Ok(Self {
             sensor,
-            home,
+            home: HomeSnapshot::default(),
             degradation,
             seed,
-            hidden_up_to,
+            hidden_up_to: -1.0,
             hidden: BTreeMap::new(),
             false_match: seed.stream("false-match"),
             normal: seed.stream("noise"),
@@ -122,6 +113,23 @@ fn blurred(bearing: Bearing, sd_rad: f64, deviations: f64) -> Bearing {
 }
 
 impl Sensor for DegradedSensor<'_> {
+    fn reset(&mut self, seed: Seed) -> Result<()> {
+        self.sensor.reset(seed)?;
+        self.seed = seed.derive("degraded");
+        self.home = self.sensor.home().clone();
+        let mut at_home = self.seed.stream("noise-home");
+        for bearing in &mut self.home.bearings {
+            *bearing = blurred(*bearing, self.degradation.noise_sd_rad, standard_normal(&mut at_home));
+        }
+        let mut keys: Vec<f64> = self.home.bearings.iter().map(|b| hiding_key(self.seed, b.id)).collect();
+        keys.sort_by(f64::total_cmp);
+        let count = libm::round(self.degradation.hidden * keys.len() as f64) as usize;
+        self.hidden_up_to = count.checked_sub(1).and_then(|last| keys.get(last)).copied().unwrap_or(-1.0);
+        self.hidden.clear();
+        (self.false_match, self.normal) = (self.seed.stream("false-match"), self.seed.stream("noise"));
+        Ok(())
+    }
+
     fn home(&self) -> &HomeSnapshot {
         &self.home
     }
@@ -182,6 +190,9 @@ mod tests {
     }
 
     impl Sensor for Carousel {
+        fn reset(&mut self, _: Seed) -> Result<()> {
+            Ok(())
+        }
         fn home(&self) -> &HomeSnapshot {
             &self.0
         }
@@ -191,7 +202,9 @@ mod tests {
     }
 
     fn sensor(degradation: Degradation, seed: u64) -> DegradedSensor<'static> {
-        DegradedSensor::new(Box::new(Carousel::new()), degradation, Seed(seed)).unwrap()
+        let mut sensor = DegradedSensor::new(Box::new(Carousel::new()), degradation).unwrap();
+        sensor.reset(Seed(seed)).unwrap();
+        sensor
     }
 
     fn look(sensor: &mut DegradedSensor<'_>) -> Vec<Bearing> {

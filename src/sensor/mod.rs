@@ -24,11 +24,19 @@ use crate::error::Result;
 use crate::geometry::Pose;
 use crate::observation::{Bearing, HomeSnapshot};
 use crate::panorama::Panorama;
+use crate::random::Seed;
 use crate::render::RendererInfo;
 
-/// A source of bearings. The home snapshot is taken when the sensor is built, with all bodies where they stand at time 0.
-pub trait Sensor {
-    /// What was seen at home.
+/// A source of bearings. It is [reset](Sensor::reset) before each run, and only then used.
+pub trait Sensor: Send {
+    /// Readies the sensor for a run: takes the home snapshot, with all bodies where they stand at time 0, and draws from `seed` all
+    /// that is random. After the same seed it tells the same.
+    ///
+    /// # Errors
+    /// When a renderer fails.
+    fn reset(&mut self, seed: Seed) -> Result<()>;
+
+    /// What was seen at home; empty before the first reset.
     fn home(&self) -> &HomeSnapshot;
 
     /// Bearings from the true pose `truth` in the room, with the bodies at `bodies` in the order of `World::bodies`. Each id

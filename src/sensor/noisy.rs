@@ -45,7 +45,7 @@ pub struct NoisySensor<'a> {
 }
 
 impl<'a> NoisySensor<'a> {
-    /// Spoils `ideal`, whose world has `landmarks` landmarks.
+    /// Spoils `ideal`, whose world has `landmarks` landmarks, as a run of `seed` has it.
     #[must_use]
     pub fn new(ideal: IdealSensor<'a>, landmarks: usize, noise: Noise, seed: Seed) -> Self {
         let mut at_home = seed.stream("bearing-noise-home");
@@ -71,6 +71,11 @@ fn blurred(bearing: Bearing, sd_rad: f64, deviations: f64) -> Bearing {
 }
 
 impl Sensor for NoisySensor<'_> {
+    fn reset(&mut self, seed: Seed) -> Result<()> {
+        *self = Self::new(self.ideal.clone(), self.landmarks as usize, self.noise, seed);
+        Ok(())
+    }
+
     fn home(&self) -> &HomeSnapshot {
         &self.home
     }

@@ -1,5 +1,6 @@
 //! Bearings through the camera: render, then extract.
 
+use std::sync::Arc;
 use std::time::Instant;
 
 use super::{Sensor, SensorTiming};
@@ -16,10 +17,10 @@ use crate::world::{OpticsSpec, World};
 const CARRIED: f64 = 2.0;
 
 /// How the room looks, and through which camera.
-#[derive(Debug, Clone, Copy)]
-pub struct Sight<'a> {
+#[derive(Debug, Clone)]
+pub struct Sight {
     /// The room under its light, exposure included.
-    pub scene: &'a Scene,
+    pub scene: Arc<Scene>,
     /// The camera's optics.
     pub optics: OpticsSpec,
 }
@@ -30,11 +31,15 @@ pub struct Sight<'a> {
 /// open is that since the last observation. From inside a body, which only a robot that nothing stops comes into, the picture is
 /// black.
 pub struct RenderedSensor<'a> {
-    renderer: &'a mut dyn Renderer,
-    sight: Sight<'a>,
+    world: &'a World,
+    renderer: Box<dyn Renderer>,
+    /// At home, and on the way.
+    sights: [Sight; 2],
     camera: Camera,
     projection: Projection,
-    extractor: Extractor,
+    settings: ExtractorSettings,
+    /// Finds the features of the home panorama again; `None` before the first reset.
+    extractor: Option<Extractor>,
     home: HomeSnapshot,
     home_panorama: Panorama,
     panorama: Panorama,
@@ -49,42 +54,35 @@ pub struct RenderedSensor<'a> {
 }
 
 impl<'a> RenderedSensor<'a> {
-    /// Takes the home panorama of `world` as `[home, now]` says first, and readies the extractor for it; all later panoramas are
-    /// as it says second. `seed` is that of the run.
-    ///
-    /// # Errors
-    /// When the renderer fails.
+    /// A sensor in `world` that sees it as `[home, now]` say, in panoramas of `projection`. The home panorama is taken when it is
+    /// reset.
+    #[must_use]
     pub fn new(
-        world: &World,
-        [home, now]: [Sight<'a>; 2],
-        renderer: &'a mut dyn Renderer,
+        world: &'a World,
+        sights: [Sight; 2],
+        renderer: Box<dyn Renderer>,
         projection: Projection,
         settings: ExtractorSettings,
-        seed: Seed,
-    ) -> Result<Self> {
-        let seed = seed.derive("camera");
-        let mut home_panorama = Panorama::black(projection);
-        let view = View { projection, robot: world.home, bodies: &world.body_poses() };
-        let noise = seed.derive("home");
-        Camera::new(home.optics).take(renderer, home.scene, &view, Twist::default(), noise, &mut home_panorama)?;
-        let extractor = Extractor::new(settings, &home_panorama);
+    ) -> Self {
         let robot = &world.spec.robot;
-        Ok(Self {
+        Self {
+            world,
             renderer,
-            sight: now,
-            camera: Camera::new(now.optics),
+            camera: Camera::new(sights[1].optics),
+            sights,
             projection,
-            home: extractor.home_snapshot(),
-            extractor,
-            home_panorama,
+            settings,
+            extractor: None,
+            home: HomeSnapshot::default(),
+            home_panorama: Panorama::black(projection),
             panorama: Panorama::black(projection),
-            seed,
+            seed: Seed(0),
             frame: 0,
             last: None,
             period_s: world.spec.task.control_period_s,
             carried: Twist { v: CARRIED * robot.max_speed_m_s, omega: CARRIED * robot.max_turn_rate_rad_s },
             timing: SensorTiming::default(),
-        })
+        }
     }
 
     /// How the robot has moved since the last observation.
@@ -102,7 +100,7 @@ impl<'a> RenderedSensor<'a> {
         self.frame += 1;
         self.last = Some(truth);
         let view = View { projection: self.projection, robot: truth, bodies };
-        let taken = self.camera.take(self.renderer, self.sight.scene, &view, twist, noise, &mut self.panorama);
+        let taken = self.camera.take(self.renderer.as_mut(), &self.sights[1].scene, &view, twist, noise, &mut self.panorama);
         match taken {
             Err(Error::CameraInside { .. }) => {
                 self.panorama = Panorama::black(self.projection);
@@ -114,6 +112,20 @@ impl<'a> RenderedSensor<'a> {
 }
 
 impl Sensor for RenderedSensor<'_> {
+    fn reset(&mut self, seed: Seed) -> Result<()> {
+        self.seed = seed.derive("camera");
+        let (home, bodies) = (&self.sights[0], self.world.body_poses());
+        let view = View { projection: self.projection, robot: self.world.home, bodies: &bodies };
+        let (still, noise) = (Twist::default(), self.seed.derive("home"));
+        let mut camera = Camera::new(home.optics);
+        camera.take(self.renderer.as_mut(), &home.scene, &view, still, noise, &mut self.home_panorama)?;
+        let extractor = self.extractor.insert(Extractor::new(self.settings.clone(), &self.home_panorama));
+        self.home = extractor.home_snapshot();
+        self.camera = Camera::new(self.sights[1].optics);
+        (self.frame, self.last, self.timing) = (0, None, SensorTiming::default());
+        Ok(())
+    }
+
     fn home(&self) -> &HomeSnapshot {
         &self.home
     }
@@ -122,7 +134,7 @@ impl Sensor for RenderedSensor<'_> {
         let rendering = Instant::now();
         self.take(truth, bodies)?;
         let extracting = Instant::now();
-        let bearings = self.extractor.observe(&self.panorama);
+        let bearings = self.extractor.as_mut().map_or_else(Vec::new, |extractor| extractor.observe(&self.panorama));
         self.timing.render_s += (extracting - rendering).as_secs_f64();
         self.timing.vision_s += extracting.elapsed().as_secs_f64();
         Ok(bearings)

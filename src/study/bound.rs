@@ -14,22 +14,21 @@
 
 use std::collections::BTreeMap;
 use std::ops::{ControlFlow, RangeInclusive};
+use std::sync::{Arc, Mutex};
 
 use nalgebra::Vector3;
 use rayon::prelude::*;
 use serde::Serialize;
 
 use super::statistics::chi_square_95;
-use crate::episode::{BeliefError, Parts, PlantKind, Setup, Start, run};
+use crate::episode::{BeliefError, Moment, Parts, PlantKind, Recorder, Setup, Simulation, Start};
 use crate::error::{Error, Result};
 use crate::estimation::anchored::map::Prior;
 use crate::estimation::anchored::motion::{Motion, SlipWatch};
 use crate::estimation::anchored::smoother::{Frame, Iterate, Sighting, Stretch};
 use crate::estimation::anchored::{AnchoredFilter, FilterSettings};
 use crate::geometry::{Matrix3, Pose, angle_of};
-use crate::method::{self, LawKind, MethodKind};
-use crate::observation::{Bearing, Estimate, HomeSnapshot, LandmarkId, Odometry};
-use crate::physics::UnicyclePlant;
+use crate::observation::{Bearing, Estimate, LandmarkId, Odometry};
 use crate::random::{Seed, Stream, standard_normal};
 use crate::sensor::{IdealSensor, Noise, NoisySensor, Sensor};
 use crate::world::World;
@@ -296,7 +295,7 @@ pub fn bound(
         odometry_share: settings.odometry_share,
         world: world.spec.name.clone(),
         world_sha256: world.sha256.clone(),
-        version: crate::VERSION,
+        version: env!("CARGO_PKG_VERSION"),
     })
 }
 
@@ -320,32 +319,27 @@ struct Path {
 impl Path {
     /// Drives home once in closed loop, on a robot whose odometry tells the truth.
     fn drive(world: &World, settings: &BoundSettings) -> Result<Self> {
-        let setup =
-            Setup { plant: PlantKind::Unicycle, noise: settings.noise(), start: settings.start.clone(), ..Setup::default() };
+        let setup = Setup { plant: PlantKind::Unicycle, start: settings.start.clone(), ..Setup::default() };
         let seed = Seed(settings.path_seed);
-        let mut plant = UnicyclePlant::new(world, setup.start_pose(world, seed)?, seed);
-        let mut sensor = BodyWatch {
-            sensor: NoisySensor::new(IdealSensor::new(world), world.landmark_count, settings.noise(), seed),
-            bodies: Vec::new(),
-        };
-        let briefing = setup.briefing(world, &sensor);
-        let mut method =
-            method::build(MethodKind::AnchoredEkf, LawKind::Proportional, FilterSettings::default(), briefing, None)?;
-        let task = setup.task(world);
-        let parts = Parts { plant: &mut plant, sensor: &mut sensor, method: method.as_mut() };
-        let record = run(parts, world.home, &task, &mut |_| ControlFlow::Continue(()))?;
+        let sensor = NoisySensor::new(IdealSensor::new(world), world.landmark_count, settings.noise(), seed);
+        let parts = Parts::with_sensor(world, setup.plant, Box::new(sensor));
+        let mut simulation = Simulation::from_parts(world, &setup, parts);
+        let bodies = Bodies::default();
+        simulation.record_to(bodies.clone());
+        let record = simulation.run(settings.path_seed, &mut |_| ControlFlow::Continue(()))?;
+        let bodies = bodies.0.lock().map(|held| held.clone()).unwrap_or_default();
         let steps = record
             .steps
             .iter()
-            .zip(sensor.bodies)
+            .zip(bodies)
             .enumerate()
             .map(|(k, (step, bodies))| PathStep {
                 truth: step.truth,
-                odometry: Odometry { twist: step.odometry, dt_s: if k == 0 { 0.0 } else { task.control_period_s } },
+                odometry: Odometry { twist: step.odometry, dt_s: if k == 0 { 0.0 } else { world.spec.task.control_period_s } },
                 bodies,
             })
             .collect();
-        Ok(Self { home: world.home, period_s: task.control_period_s, steps })
+        Ok(Self { home: world.home, period_s: world.spec.task.control_period_s, steps })
     }
 
     /// The steps as the filter's motion model has them.
@@ -484,20 +478,16 @@ fn strayed(motion: &Motion, stream: &mut Stream) -> Pose {
     Pose::new(motion.delta.x + off.x, motion.delta.y + off.y, motion.delta.heading + off.z)
 }
 
-/// A sensor that keeps where the bodies stood at each look.
-struct BodyWatch<'a> {
-    sensor: NoisySensor<'a>,
-    bodies: Vec<Vec<Pose>>,
-}
+/// Keeps where the bodies stood at each look.
+#[derive(Clone, Default)]
+struct Bodies(Arc<Mutex<Vec<Vec<Pose>>>>);
 
-impl Sensor for BodyWatch<'_> {
-    fn home(&self) -> &HomeSnapshot {
-        self.sensor.home()
-    }
-
-    fn observe(&mut self, truth: Pose, bodies: &[Pose]) -> Result<Vec<Bearing>> {
-        self.bodies.push(bodies.to_vec());
-        self.sensor.observe(truth, bodies)
+impl Recorder for Bodies {
+    fn record(&mut self, moment: &Moment<'_>) -> Result<()> {
+        if let (Some(_), Ok(mut held)) = (moment.step.seen, self.0.lock()) {
+            held.push(moment.bodies.to_vec());
+        }
+        Ok(())
     }
 }
 

@@ -11,12 +11,13 @@ use serde::Serialize;
 
 use super::seeds::{Job, SeedEvent, Spread, run_jobs};
 use super::statistics::wilson_95;
+use crate::control::Law;
 use crate::control::vectors::{VectorLaw, align};
-use crate::episode::{Bearings, Bench, Outcome, PlantKind, Setup, SetupRecord, Summary};
+use crate::episode::{Outcome, PlantKind, SensorKind, Setup, SetupRecord, Simulation, Summary};
 use crate::error::{Error, Result};
 use crate::geometry::{Pose, Vector2, angle_of, wrap};
+use crate::method::MethodKind;
 use crate::method::exec::ExecCommand;
-use crate::method::{LawKind, MethodKind};
 use crate::random::Seed;
 use crate::world::World;
 use crate::world::polygon::{anticlockwise, bounds, contains};
@@ -29,40 +30,40 @@ pub struct Contender {
     /// The method.
     pub method: MethodKind,
     /// What steers it.
-    pub law: LawKind,
+    pub law: Law,
     /// Whether it has a compass.
     pub compass: bool,
     /// Whether it is told the true start.
     pub told_start: bool,
 }
 
-const fn contender(key: &'static str, method: MethodKind, law: LawKind) -> Contender {
+const fn contender(key: &'static str, method: MethodKind, law: Law) -> Contender {
     Contender { key: Cow::Borrowed(key), method, law, compass: false, told_start: false }
 }
 
 const fn with_compass(key: &'static str, method: MethodKind) -> Contender {
-    Contender { key: Cow::Borrowed(key), method, law: LawKind::Proportional, compass: true, told_start: false }
+    Contender { key: Cow::Borrowed(key), method, law: Law::Proportional, compass: true, told_start: false }
 }
 
-const fn told(key: &'static str, law: LawKind) -> Contender {
+const fn told(key: &'static str, law: Law) -> Contender {
     Contender { key: Cow::Borrowed(key), method: MethodKind::PaperEkf, law, compass: false, told_start: true }
 }
 
 /// All contenders that the project brings, in the order of tables.
 pub const CONTENDERS: [Contender; 14] = [
-    contender("anchored-ekf", MethodKind::AnchoredEkf, LawKind::Proportional),
-    contender("anchored-ekf-lyapunov", MethodKind::AnchoredEkf, LawKind::Lyapunov),
-    told("paper-ekf-told", LawKind::Proportional),
-    told("paper-ekf-told-lyapunov", LawKind::Lyapunov),
-    contender("paper-ekf", MethodKind::PaperEkf, LawKind::Proportional),
-    contender("paper-ekf-lyapunov", MethodKind::PaperEkf, LawKind::Lyapunov),
-    contender("alv", MethodKind::Alv, LawKind::Proportional),
+    contender("anchored-ekf", MethodKind::AnchoredEkf, Law::Proportional),
+    contender("anchored-ekf-lyapunov", MethodKind::AnchoredEkf, Law::Lyapunov),
+    told("paper-ekf-told", Law::Proportional),
+    told("paper-ekf-told-lyapunov", Law::Lyapunov),
+    contender("paper-ekf", MethodKind::PaperEkf, Law::Proportional),
+    contender("paper-ekf-lyapunov", MethodKind::PaperEkf, Law::Lyapunov),
+    contender("alv", MethodKind::Alv, Law::Proportional),
     with_compass("alv-compass", MethodKind::Alv),
-    contender("tron-daniilidis", MethodKind::TronDaniilidis, LawKind::Proportional),
+    contender("tron-daniilidis", MethodKind::TronDaniilidis, Law::Proportional),
     with_compass("tron-daniilidis-compass", MethodKind::TronDaniilidis),
-    contender("weber", MethodKind::Weber, LawKind::Proportional),
+    contender("weber", MethodKind::Weber, Law::Proportional),
     with_compass("weber-compass", MethodKind::Weber),
-    contender("ibvs", MethodKind::Ibvs, LawKind::Proportional),
+    contender("ibvs", MethodKind::Ibvs, Law::Proportional),
     with_compass("ibvs-compass", MethodKind::Ibvs),
 ];
 
@@ -71,7 +72,7 @@ impl Contender {
     #[must_use]
     pub fn program(number: usize, command: ExecCommand, compass: bool) -> Self {
         let key = Cow::Owned(format!("exec-{number}"));
-        Self { key, method: MethodKind::Exec(command), law: LawKind::Proportional, compass, told_start: false }
+        Self { key, method: MethodKind::Exec(command), law: Law::Proportional, compass, told_start: false }
     }
 
     /// The law of its homing vector; `None` for filters, which have none at standstill.
@@ -158,7 +159,7 @@ pub struct Comparison {
     /// What all share; method, law, compass and start are the contenders' own.
     pub plant: PlantKind,
     /// Where bearings come from.
-    pub bearings: Bearings,
+    pub bearings: SensorKind,
     /// Cruising speed, m/s.
     pub speed_m_s: f64,
     /// Arrival radius, m.
@@ -206,7 +207,7 @@ pub fn compare(
     Ok(Comparison {
         world: world.spec.name.clone(),
         world_sha256: world.sha256.clone(),
-        version: crate::VERSION,
+        version: env!("CARGO_PKG_VERSION"),
         seeds: [*seeds.start(), *seeds.end()],
         grid_spacing_m,
         grid_heading_rad: heading,
@@ -255,8 +256,9 @@ fn grid_starts(world: &World, places: usize, heading: f64) -> (Option<f64>, Vec<
 /// Homing vectors at standstill: direction in the room, and angle to the direction of home.
 fn vectors(world: &World, setup: &Setup, contender: &Contender, grid: &[Pose]) -> Result<Vec<Option<(f64, f64)>>> {
     let Some(law) = contender.vector_law() else { return Ok(vec![None; grid.len()]) };
-    let mut bench = Bench::new(world, setup)?;
-    let mut sensor = bench.sensor(Seed(0))?;
+    let mut simulation = Simulation::new(world, setup)?;
+    let sensor = simulation.sensor();
+    sensor.reset(Seed(0))?;
     let home = sensor.home().clone();
     let bodies = world.body_poses();
     let look = |pose: &Pose| -> Result<Option<(f64, f64)>> {
@@ -327,7 +329,7 @@ mod tests {
     #[test]
     fn all_run_from_the_same_starts() {
         let world = World::open("paper-ideal").unwrap();
-        let setup = Setup { plant: PlantKind::Unicycle, bearings: Bearings::Ideal, ..Setup::default() };
+        let setup = Setup { plant: PlantKind::Unicycle, sensor: SensorKind::Ideal, ..Setup::default() };
         let names = ["paper-ekf-told", "alv-compass", "ibvs"].map(str::to_owned);
         let contenders = pick(&names).unwrap();
         let result = compare(&world, &setup, &contenders, &(1..=3), 9, 2, &|_| ControlFlow::Continue(())).unwrap();

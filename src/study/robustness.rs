@@ -189,7 +189,7 @@ pub fn run(
         renderer,
         world: world.spec.name.clone(),
         world_sha256: world.sha256.clone(),
-        version: crate::VERSION,
+        version: env!("CARGO_PKG_VERSION"),
     })
 }
 
@@ -225,7 +225,7 @@ impl Cell {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::episode::Bearings;
+    use crate::episode::SensorKind;
     use crate::method::MethodKind;
 
     #[test]
@@ -240,7 +240,7 @@ mod tests {
     #[test]
     fn wrong_claims_are_those_outside_the_arrival_radius() {
         let world = World::open("lab").unwrap();
-        let setup = Setup { bearings: Bearings::Ideal, method: MethodKind::Alv, ..Setup::default() };
+        let setup = Setup { sensor: SensorKind::Ideal, method: MethodKind::Alv, ..Setup::default() };
         let watch = &|_: RobustnessEvent<'_>| ControlFlow::Continue(());
         let study = run(&world, &setup, &[Axis::Noise], &(1..=8), 1, watch).unwrap();
         let worst = study.cells.last().unwrap();
@@ -257,7 +257,7 @@ mod tests {
     fn levels_worsen_and_are_run_once() {
         assert_eq!(batches(&Axis::ALL), 8 + 7 + 5 + 6 - 1, "nothing hidden and no false match are one condition");
         let world = World::open("lab").unwrap();
-        let setup = Setup { bearings: Bearings::Ideal, ..Setup::default() };
+        let setup = Setup { sensor: SensorKind::Ideal, ..Setup::default() };
         let axes = [Axis::Hidden, Axis::FalseMatches];
         let count = std::sync::atomic::AtomicUsize::new(0);
         let study = |threads| {

@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use serde::Serialize;
 
 use super::statistics::{quantile, wilson_95};
-use crate::episode::{Bench, Outcome, Progress, Setup, SetupRecord, Summary};
+use crate::episode::{Outcome, Progress, Setup, SetupRecord, Simulation, Summary};
 use crate::error::{Error, Result};
 use crate::geometry::Pose;
 use crate::world::World;
@@ -58,13 +58,13 @@ pub fn run_jobs(
     threads: usize,
     watch: &(dyn Fn(SeedEvent<'_>) -> ControlFlow<()> + Sync),
 ) -> Result<Vec<Summary>> {
-    let mut benches = vec![Bench::new(world, setup)?];
+    let mut benches = vec![Simulation::new(world, setup)?];
     for _ in 1..threads.min(jobs.len()) {
         benches.push(benches[0].another()?);
     }
     let next = AtomicUsize::new(0);
     let stop = AtomicBool::new(false);
-    let work = |bench: &mut Bench<'_>| -> Result<Vec<(usize, Summary)>> {
+    let work = |bench: &mut Simulation<'_>| -> Result<Vec<(usize, Summary)>> {
         let mut done = Vec::new();
         loop {
             let index = next.fetch_add(1, Ordering::Relaxed);
@@ -237,7 +237,7 @@ impl SeedsSummary {
             setup: SetupRecord::new(setup, world),
             world: world.spec.name.clone(),
             world_sha256: world.sha256.clone(),
-            version: crate::VERSION,
+            version: env!("CARGO_PKG_VERSION"),
         }
     }
 }

@@ -97,7 +97,7 @@ impl<'a> Meta<'a> {
             renderer,
             world: &world.spec.name,
             world_sha256: &world.sha256,
-            version: wayhome::VERSION,
+            version: env!("CARGO_PKG_VERSION"),
         }
     }
 }

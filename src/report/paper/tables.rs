@@ -129,7 +129,7 @@ pub fn table_two(case: &ImageCase, runs: &[Run], claims: &ImageClaims) -> Result
          (the paper gives none here; this is that of its section IV-C), Q = 0.01 I, **M = I**, P(0|0) = I, **the filter started at the \
          true state**, odometry exact. Each cell is ours, then the paper's.\n\n",
         set = set_text(case),
-        v = 100.0 * case.terms.speed_m_s,
+        v = 100.0 * case.world.spec.task.speed_m_s,
     );
     text += &rmse_table(runs, &TABLE_II, true);
     text += &format!("\n![The three objects in the home panorama](fig4-objects.png)\n\n{}\n", objects_table(case));

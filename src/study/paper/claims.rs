@@ -1,20 +1,14 @@
 //! What else the paper says, or leaves unsaid, put to the test on its ideal setting.
 
+use super::LAWS;
 use super::ideal::{Ideal, Run, Twists};
 use super::images::{ImageCase, image_settings};
-use super::{BETA, LAWS};
-use crate::control::Law;
+use crate::control::{BETA, Law};
 use crate::error::Result;
 use crate::estimation::paper::{PaperSettings, Prediction, Transition};
 use crate::geometry::{Pose, Vector2, angle_of, direction};
+use crate::method::untold;
 use crate::ode::Tolerance;
-
-/// Where a filter starts that is told nothing: R = 50 cm, theta = 0.1, alpha = 0.
-#[must_use]
-pub fn untold() -> Pose {
-    let p = direction(0.1) * 0.5;
-    Pose::new(p.x, p.y, 0.0)
-}
 
 /// A way in which the supposed start differs from the true one.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -121,43 +115,47 @@ const NOISE_SEEDS: u64 = 10;
 /// # Errors
 /// When the anchored filter cannot be built.
 pub fn claims(ideal: &Ideal) -> Result<Claims> {
-    let both = |runs: &[Run]| LAWS.map(|law| tally(runs, law));
     let printed = PaperSettings { transition: Transition::Printed, ..PaperSettings::default() };
     let started = |settings: PaperSettings| {
         let twists = Twists { settings, ..Twists::default() };
-        let each = |error: StartError| (error, both(&ideal.runs(&twists, |start| error.apply(start))));
-        StartError::ALL.map(each).to_vec()
+        let each = |error: StartError| Ok((error, both(&ideal.runs(&twists, |start| error.apply(start))?)));
+        StartError::ALL.into_iter().map(each).collect::<Result<Vec<_>>>()
     };
     let noise = |sd_rad: f64| {
-        let runs: Vec<Run> = (1..=NOISE_SEEDS)
-            .flat_map(|seed| ideal.runs(&Twists { noise: Some((sd_rad, seed)), ..Twists::default() }, |start| *start))
-            .collect();
-        (sd_rad, both(&runs))
+        let runs: Vec<Vec<Run>> = (1..=NOISE_SEEDS)
+            .map(|seed| ideal.runs(&Twists { noise: Some((sd_rad, seed)), ..Twists::default() }, |start| *start))
+            .collect::<Result<_>>()?;
+        Ok((sd_rad, both(&runs.concat())))
     };
-    let predicted = |prediction| {
+    let predicted = |prediction| -> Result<Both> {
         let settings = PaperSettings { prediction, ..PaperSettings::default() };
-        both(&ideal.runs(&Twists { settings, ..Twists::default() }, |start| *start))
+        Ok(both(&ideal.runs(&Twists { settings, ..Twists::default() }, |start| *start)?))
     };
-    let beta = [0.1, 0.01]
-        .into_iter()
-        .flat_map(|period_s| [1.01, BETA, 2.0, 3.0, 5.0, 10.0, 20.0].into_iter().map(move |beta| (beta, period_s)));
+    let beta = |beta: f64, period_s: f64| {
+        let mut faster = ideal.clone();
+        faster.world.spec.task.control_period_s = period_s;
+        let runs = faster.runs(&Twists { beta, ..Twists::default() }, |start| *start)?;
+        Ok((beta, period_s, tally(&runs, Law::Lyapunov)))
+    };
+    let betas = [1.01, BETA, 2.0, 3.0, 5.0, 10.0, 20.0];
     Ok(Claims {
-        starts: started(PaperSettings::default()),
-        starts_printed: started(printed),
+        starts: started(PaperSettings::default())?,
+        starts_printed: started(printed)?,
         // 0.3 degrees, 1 degree, and the square root of M = 0.1.
-        noise: [0.3_f64.to_radians(), 1.0_f64.to_radians(), 0.1_f64.sqrt()].map(noise).to_vec(),
-        euler: predicted(Prediction::Euler),
-        ode45: predicted(Prediction::Ode(Tolerance::ODE45)),
+        noise: [0.3_f64.to_radians(), 1.0_f64.to_radians(), 0.1_f64.sqrt()].into_iter().map(noise).collect::<Result<_>>()?,
+        euler: predicted(Prediction::Euler)?,
+        ode45: predicted(Prediction::Ode(Tolerance::ODE45))?,
         anchored: both(&ideal.anchored()?),
-        beta: beta
-            .map(|(beta, period_s)| {
-                let mut faster = ideal.clone();
-                faster.terms.period_s = period_s;
-                let runs = faster.runs(&Twists { beta, ..Twists::default() }, |start| *start);
-                (beta, period_s, tally(&runs, Law::Lyapunov))
-            })
-            .collect(),
+        beta: [0.1, 0.01]
+            .into_iter()
+            .flat_map(|period_s| betas.map(|b| (b, period_s)))
+            .map(|(b, period_s)| beta(b, period_s))
+            .collect::<Result<_>>()?,
     })
+}
+
+fn both(runs: &[Run]) -> Both {
+    LAWS.map(|law| tally(runs, law))
 }
 
 /// What a set's images have to do with the errors that the paper reports for them.
@@ -181,22 +179,23 @@ pub struct ImageClaims {
 }
 
 /// Runs a set's experiments.
-#[must_use]
-pub fn image_claims(case: &ImageCase) -> ImageClaims {
-    let both = |runs: &[Run]| LAWS.map(|law| tally(runs, law));
+///
+/// # Errors
+/// When the set has fewer than three objects.
+pub fn image_claims(case: &ImageCase) -> Result<ImageClaims> {
     let usual = image_settings();
     let printed = PaperSettings { transition: Transition::Printed, ..usual };
     let blind = PaperSettings { measurement: 1e12, ..usual };
     let (one_look_cm, bearing_rms_rad, interpolation_rms_rad) = one_look(case);
-    ImageClaims {
-        faithful: both(&case.runs(usual, |start| *start)),
-        printed: both(&case.runs(printed, |start| *start)),
-        blind: both(&case.runs(blind, |start| *start)),
-        untold: both(&case.runs(usual, |_| untold())),
+    Ok(ImageClaims {
+        faithful: both(&case.runs(usual, |start| *start)?),
+        printed: both(&case.runs(printed, |start| *start)?),
+        blind: both(&case.runs(blind, |start| *start)?),
+        untold: both(&case.runs(usual, |_| untold())?),
         one_look_cm,
         bearing_rms_rad,
         interpolation_rms_rad,
-    }
+    })
 }
 
 fn one_look(case: &ImageCase) -> (f64, f64, f64) {

@@ -8,16 +8,16 @@
 
 use rayon::prelude::*;
 
-use super::BETA;
 use super::ideal::Ideal;
-use super::images::{ImageCase, SD_RAD, image_settings};
-use super::trial::{Eyes, PaperPilot, Terms, Track, VectorPilot, anchored, drive};
-use crate::control::Law;
-use crate::control::printed::PrintedLaw;
+use super::images::{ImageCase, image_settings};
+use super::trial::{self, Eyes, paper_ekf};
 use crate::control::vectors::VectorLaw;
+use crate::control::{BETA, Law};
+use crate::episode::Setup;
 use crate::error::Result;
 use crate::geometry::{Pose, Vector2};
-use crate::observation::{Bearing, HomeSnapshot};
+use crate::method::{MethodKind, untold};
+use crate::observation::HomeSnapshot;
 
 /// Ts of Fig. 8, s.
 const PERIOD_S: f64 = 0.01;
@@ -69,6 +69,16 @@ impl Entrant {
             Self::Paper(_) => Told::Start,
             Self::PaperUntold(_) | Self::Anchored(_) => Told::Nothing,
             Self::Vector(_, _, told) => told,
+        }
+    }
+
+    /// The same as a setup of a run from `start` (home frame).
+    fn setup(self, start: Pose) -> Setup {
+        match self {
+            Self::Paper(law) => paper_ekf(law, BETA, image_settings(), start),
+            Self::PaperUntold(law) => paper_ekf(law, BETA, image_settings(), untold()),
+            Self::Anchored(law) => trial::method(MethodKind::AnchoredEkf, law),
+            Self::Vector(vector, law, _) => trial::method(vector.into(), law),
         }
     }
 
@@ -136,7 +146,9 @@ impl Contest {
 /// # Errors
 /// When the anchored filter cannot be built.
 pub fn contest(case: &ImageCase, source: Source) -> Result<Contest> {
-    let terms = Terms { period_s: PERIOD_S, speed_m_s: SPEED_M_S, ..case.terms };
+    let mut world = case.world.clone();
+    (world.spec.task.control_period_s, world.spec.task.speed_m_s) = (PERIOD_S, SPEED_M_S);
+    world.spec.robot.max_speed_m_s = SPEED_M_S;
     let points: Vec<Vector2<f64>> = case.field.objects.iter().filter_map(|o| case.field.fix(o)).map(|fix| fix.point).collect();
     let crowd = Entrant::all().into_iter().filter(|entrant| {
         matches!(entrant, Entrant::Anchored(_) | Entrant::Vector(VectorLaw::Alv | VectorLaw::Ibvs, _, Told::Compass))
@@ -145,41 +157,25 @@ pub fn contest(case: &ImageCase, source: Source) -> Result<Contest> {
     let entries: Vec<(Entrant, usize)> =
         Entrant::all().into_iter().map(|e| (e, 3)).chain(crowd.map(|e| (e, all)).filter(|_| all > 3)).collect();
     let enter = |&(entrant, objects): &(Entrant, usize)| -> Result<Row> {
-        let exact = Ideal { landmarks: points[..objects.min(all)].to_vec(), starts: Vec::new(), terms };
-        let mut look = |pose: &Pose| -> Vec<Bearing> {
-            match source {
-                Source::Images => case.field.bearings(pose, objects, SD_RAD),
-                Source::Points => exact.bearings(pose),
-            }
-        };
-        let home = match source {
-            Source::Images => case.field.home(objects, SD_RAD),
-            Source::Points => HomeSnapshot { bearings: exact.bearings(&Pose::IDENTITY) },
-        };
+        let exact = Ideal { landmarks: points[..objects.min(all)].to_vec(), starts: Vec::new(), world: world.clone() };
+        let compass = entrant.told() == Told::Compass;
         let mut row = Row { entrant, objects, times_s: [None; 4], ends_m: [f64::NAN; 4] };
-        for (k, (_, start)) in case.starts.iter().enumerate() {
-            if let Some(track) = run(entrant, &terms, *start, &home, &mut look)? {
-                (row.times_s[k], row.ends_m[k]) = (track.time_s(), track.final_distance_m());
-            }
+        for (k, &(_, start)) in case.starts.iter().enumerate() {
+            let setup = entrant.setup(start);
+            let track = match source {
+                Source::Images => case.run(&world, &setup, start, objects, compass)?,
+                Source::Points => {
+                    let home = HomeSnapshot { bearings: exact.bearings(&Pose::IDENTITY) };
+                    let look = Box::new(|pose: &Pose| exact.bearings(pose));
+                    trial::run(&world, &setup, start, Eyes { home, look, compass })?
+                }
+            };
+            (row.times_s[k], row.ends_m[k]) = (track.time_s(), track.final_distance_m());
         }
         Ok(row)
     };
     let rows = entries.par_iter().map(enter).collect::<Result<_>>()?;
-    let straight = |k: usize| (case.starts[k].1.position().norm() - terms.radius_m) / terms.speed_m_s;
+    let task = &world.spec.task;
+    let straight = |k: usize| (case.starts[k].1.position().norm() - task.arrival_radius_m) / task.speed_m_s;
     Ok(Contest { source, straight_s: std::array::from_fn(straight), rows })
-}
-
-fn run(entrant: Entrant, terms: &Terms, start: Pose, home: &HomeSnapshot, eyes: &mut Eyes<'_>) -> Result<Option<Track>> {
-    let law = PrintedLaw { law: entrant.law(), speed_m_s: terms.speed_m_s, radius_m: terms.radius_m, beta: BETA };
-    let compass = entrant.told() == Told::Compass;
-    let track = match entrant {
-        Entrant::Paper(_) | Entrant::PaperUntold(_) => {
-            let initial = if entrant.told() == Told::Start { start } else { super::claims::untold() };
-            let Some(mut pilot) = PaperPilot::new(law, image_settings(), home, initial) else { return Ok(None) };
-            drive(terms, start, eyes, compass, &mut pilot)
-        }
-        Entrant::Anchored(law) => drive(terms, start, eyes, compass, anchored(law, terms, home)?.as_mut()),
-        Entrant::Vector(vector, ..) => drive(terms, start, eyes, compass, &mut VectorPilot { vector, law, home }),
-    };
-    Ok(Some(track))
 }

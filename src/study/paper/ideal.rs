@@ -1,25 +1,26 @@
 //! Section IV-A: three point landmarks, accurate bearings, four starts, both laws. Table I and Fig. 3.
 
-use super::trial::{PaperPilot, Terms, Track, anchored, drive};
-use super::{BETA, LAWS, STARTS};
-use crate::control::Law;
-use crate::control::printed::PrintedLaw;
+use super::trial::{self, Eyes, Track, paper_ekf, unlimited};
+use super::{LAWS, STARTS};
+use crate::control::{BETA, Law};
+use crate::episode::Setup;
 use crate::error::{Error, Result};
 use crate::estimation::paper::PaperSettings;
 use crate::geometry::{Pose, Vector2, angle_of};
+use crate::method::MethodKind;
 use crate::observation::{Bearing, HomeSnapshot, LandmarkId};
 use crate::random::{Seed, Stream, standard_normal};
 use crate::world::World;
 
-/// The setting: landmarks around home and the terms of a run.
+/// The setting: landmarks around home, and the world whose task the runs have.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Ideal {
     /// Landmarks in the home frame, m.
     pub landmarks: Vec<Vector2<f64>>,
     /// The starts by name, in the home frame.
     pub starts: Vec<(&'static str, Pose)>,
-    /// Ts, v, Rc and the limit.
-    pub terms: Terms,
+    /// Home, Ts, v, Rc and the time limit.
+    pub world: World,
 }
 
 /// One run of the table.
@@ -66,14 +67,7 @@ impl Ideal {
             });
         }
         let starts = STARTS.into_iter().map(|name| Ok((name, home.to_local(&world.named_start(name)?))));
-        let task = &world.spec.task;
-        let terms = Terms {
-            period_s: task.control_period_s,
-            speed_m_s: task.speed_m_s,
-            radius_m: task.arrival_radius_m,
-            limit_s: task.time_limit_s,
-        };
-        Ok(Self { landmarks, starts: starts.collect::<Result<_>>()?, terms })
+        Ok(Self { landmarks, starts: starts.collect::<Result<_>>()?, world: unlimited(world) })
     }
 
     /// The exact bearings from a pose in the home frame.
@@ -87,12 +81,14 @@ impl Ideal {
         self.landmarks.iter().enumerate().map(bearing).collect()
     }
 
-    /// One run of the paper's filter, started at `initial`.
-    #[must_use]
-    pub fn run(&self, law: Law, start: Pose, initial: Pose, twists: &Twists) -> Track {
-        let law = PrintedLaw { law, speed_m_s: self.terms.speed_m_s, radius_m: self.terms.radius_m, beta: twists.beta };
-        let mut noise = twists.noise.map(|(sd_rad, seed)| (sd_rad, Seed(seed).stream("paper bearings")));
-        let mut look = |pose: &Pose| {
+    /// One run of `setup` from `start` (home frame), with the landmarks' bearings and normal noise of a standard deviation (rad) and
+    /// a seed.
+    ///
+    /// # Errors
+    /// When the method needs more landmarks than there are.
+    pub fn run(&self, setup: &Setup, start: Pose, noise: Option<(f64, u64)>) -> Result<Track> {
+        let mut noise = noise.map(|(sd_rad, seed)| (sd_rad, Seed(seed).stream("paper bearings")));
+        let mut look = move |pose: &Pose| {
             let mut seen = self.bearings(pose);
             if let Some((sd_rad, stream)) = &mut noise {
                 blur(&mut seen, *sd_rad, stream);
@@ -100,46 +96,35 @@ impl Ideal {
             seen
         };
         let home = HomeSnapshot { bearings: look(&Pose::IDENTITY) };
-        match PaperPilot::new(law, twists.settings, &home, initial) {
-            Some(mut pilot) => drive(&self.terms, start, &mut look, false, &mut pilot),
-            None => Track { samples: Vec::new(), home: false, straight_s: 0.0 }, // fewer than three landmarks: `of` refuses them
-        }
+        trial::run(&self.world, setup, start, Eyes { home, look: Box::new(look), compass: false })
     }
 
-    /// All starts and laws; `initial` says where the filter is started for a run that starts at its argument.
-    #[must_use]
-    pub fn runs(&self, twists: &Twists, initial: impl Fn(&Pose) -> Pose) -> Vec<Run> {
-        let each = |law: Law| {
-            let initial = &initial;
-            self.starts.iter().map(move |&(name, start)| Run {
-                start: name,
-                law,
-                track: self.run(law, start, initial(&start), twists),
-            })
-        };
-        LAWS.into_iter().flat_map(each).collect()
+    /// The paper's filter from all starts with both laws; `initial` says where it is started for a run that starts at its argument.
+    ///
+    /// # Errors
+    /// When there are fewer than three landmarks.
+    pub fn runs(&self, twists: &Twists, initial: impl Fn(&Pose) -> Pose) -> Result<Vec<Run>> {
+        self.each(|law, start| self.run(&paper_ekf(law, twists.beta, twists.settings, initial(&start)), start, twists.noise))
     }
 
     /// The anchored filter from all starts with both laws, told nothing.
     ///
     /// # Errors
-    /// When it cannot be built.
+    /// When there are fewer than three landmarks.
     pub fn anchored(&self) -> Result<Vec<Run>> {
-        let home = HomeSnapshot { bearings: self.bearings(&Pose::IDENTITY) };
-        let mut runs = Vec::new();
-        for law in LAWS {
-            for &(name, start) in &self.starts {
-                let mut method = anchored(law, &self.terms, &home)?;
-                let track = drive(&self.terms, start, &mut |pose| self.bearings(pose), false, method.as_mut());
-                runs.push(Run { start: name, law, track });
-            }
-        }
-        Ok(runs)
+        self.each(|law, start| self.run(&trial::method(MethodKind::AnchoredEkf, law), start, None))
+    }
+
+    fn each(&self, run: impl Fn(Law, Pose) -> Result<Track>) -> Result<Vec<Run>> {
+        let all = LAWS.into_iter().flat_map(|law| self.starts.iter().map(move |&(name, start)| (law, name, start)));
+        all.map(|(law, name, start)| Ok(Run { start: name, law, track: run(law, start)? })).collect()
     }
 
     /// Table I: the filter started at the true pose.
-    #[must_use]
-    pub fn table_one(&self) -> Vec<Run> {
+    ///
+    /// # Errors
+    /// When there are fewer than three landmarks.
+    pub fn table_one(&self) -> Result<Vec<Run>> {
         self.runs(&Twists::default(), |start| *start)
     }
 }

@@ -8,9 +8,10 @@ use std::sync::Mutex;
 
 use super::ideal::Run;
 use super::objects::ObjectField;
-use super::trial::{PaperPilot, Terms, drive};
-use super::{BETA, LAWS, STARTS};
-use crate::control::printed::PrintedLaw;
+use super::trial::{self, Eyes, Track, paper_ekf, unlimited};
+use super::{LAWS, STARTS};
+use crate::control::BETA;
+use crate::episode::Setup;
 use crate::error::{Error, Result};
 use crate::estimation::paper::PaperSettings;
 use crate::geometry::Pose;
@@ -87,7 +88,7 @@ impl ImageSet {
     }
 }
 
-/// Bearings of a set's objects, and the starts and terms of runs on it.
+/// Bearings of a set's objects, and the starts and the task of runs on it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ImageCase {
     /// Which set.
@@ -100,8 +101,8 @@ pub struct ImageCase {
     pub field: ObjectField,
     /// The paper's starts, in the home frame.
     pub starts: Vec<(&'static str, Pose)>,
-    /// Ts = 0.1 s, v, Rc and the limit.
-    pub terms: Terms,
+    /// Home, Ts = 0.1 s, v, Rc and the time limit.
+    pub world: World,
 }
 
 impl ImageCase {
@@ -138,29 +139,28 @@ impl ImageCase {
             }
         };
         let starts = STARTS.into_iter().map(|name| Ok((name, world.home.to_local(&world.named_start(name)?))));
-        let task = &world.spec.task;
-        let terms = Terms {
-            period_s: task.control_period_s,
-            speed_m_s: task.speed_m_s,
-            radius_m: task.arrival_radius_m,
-            limit_s: task.time_limit_s,
-        };
-        Ok(Self { set, rendered: folder.is_none(), home, field, starts: starts.collect::<Result<_>>()?, terms })
+        let (rendered, starts) = (folder.is_none(), starts.collect::<Result<_>>()?);
+        Ok(Self { set, rendered, home, field, starts, world: unlimited(&world) })
+    }
+
+    /// One run of `setup` from `start` (home frame) on the first `objects` objects, in `world` instead of the set's own where it has
+    /// another task.
+    ///
+    /// # Errors
+    /// When the method needs more landmarks than there are.
+    pub fn run(&self, world: &World, setup: &Setup, start: Pose, objects: usize, compass: bool) -> Result<Track> {
+        let look = Box::new(|pose: &Pose| self.field.bearings(pose, objects, SD_RAD));
+        trial::run(world, setup, start, Eyes { home: self.field.home(objects, SD_RAD), look, compass })
     }
 
     /// The paper's filter with its settings for images (M = I) but for those of `settings`, from all starts with both laws.
-    #[must_use]
-    pub fn runs(&self, settings: PaperSettings, initial: impl Fn(&Pose) -> Pose) -> Vec<Run> {
-        let home = self.field.home(3, SD_RAD);
-        let run = |law, start: Pose| {
-            let law = PrintedLaw { law, speed_m_s: self.terms.speed_m_s, radius_m: self.terms.radius_m, beta: BETA };
-            let mut pilot = PaperPilot::new(law, settings, &home, initial(&start))?;
-            Some(drive(&self.terms, start, &mut |pose| self.field.bearings(pose, 3, SD_RAD), false, &mut pilot))
-        };
-        LAWS.into_iter()
-            .flat_map(|law| self.starts.iter().map(move |&(name, start)| (law, name, start)))
-            .filter_map(|(law, name, start)| Some(Run { start: name, law, track: run(law, start)? }))
-            .collect()
+    ///
+    /// # Errors
+    /// When the set has fewer than three objects.
+    pub fn runs(&self, settings: PaperSettings, initial: impl Fn(&Pose) -> Pose) -> Result<Vec<Run>> {
+        let all = LAWS.into_iter().flat_map(|law| self.starts.iter().map(move |&(name, start)| (law, name, start)));
+        let run = |law, start: Pose| self.run(&self.world, &paper_ekf(law, BETA, settings, initial(&start)), start, 3, false);
+        all.map(|(law, name, start)| Ok(Run { start: name, law, track: run(law, start)? })).collect()
     }
 }
 

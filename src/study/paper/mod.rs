@@ -20,5 +20,3 @@ use crate::control::Law;
 pub const LAWS: [Law; 2] = [Law::Proportional, Law::Lyapunov];
 /// Names of the starts in every one of the paper's settings.
 pub const STARTS: [&str; 4] = ["P1", "P2", "P3", "P4"];
-/// The beta of (16) in all runs that do not vary it. The paper says only that it is more than 1.
-pub const BETA: f64 = 1.5;

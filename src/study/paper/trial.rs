@@ -1,33 +1,23 @@
 //! One run as the paper simulates it: a unicycle at constant speed, stopped when it is truly within Rc of home.
+//!
+//! Such a run is an ordinary [`Simulation`] with the paper's plant, pace and stop rule; only its bearings are told by a function.
 
-use crate::control::Law;
-use crate::control::printed::PrintedLaw;
-use crate::control::vectors::{VectorLaw, align};
+use std::ops::ControlFlow;
+
+use crate::control::{BETA, Law, Pace};
+use crate::episode::{Outcome, Parts, PlantKind, Record, Setup, Simulation, StopRule};
 use crate::error::Result;
-use crate::estimation::anchored::FilterSettings;
-use crate::estimation::paper::{PaperEkf, PaperSettings};
-use crate::geometry::{Pose, Twist, angle_of, sin_cos, wrap};
-use crate::method::{self, LawKind, MethodKind};
-use crate::observation::{
-    Bearing, Briefing, Decision, HomeSnapshot, LandmarkId, Method, Observation, Odometry, RobotSheet, Status, TaskSheet,
-};
-use crate::ode::{Tolerance, integrate};
+use crate::estimation::paper::PaperSettings;
+use crate::geometry::{Pose, angle_of, wrap};
+use crate::method::MethodKind;
+use crate::observation::{Bearing, HomeSnapshot};
+use crate::random::Seed;
+use crate::sensor::Sensor;
+use crate::world::{TaskSpec, World};
 
-/// What a run is given beside its start: the paper's Ts, v, Rc, and when to give up.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Terms {
-    /// Ts, s.
-    pub period_s: f64,
-    /// v, m/s.
-    pub speed_m_s: f64,
-    /// Rc, m.
-    pub radius_m: f64,
-    /// A run that takes longer has not come home, s.
-    pub limit_s: f64,
-}
-
-/// What sees landmarks from a pose in the home frame. It may count its looks, to draw noise.
-pub type Eyes<'a> = dyn FnMut(&Pose) -> Vec<Bearing> + 'a;
+/// Limit of everyone's turn rate, rad/s: what the paper's proportional law asks for at most. With the paper's constants the nonlinear
+/// one asks for less.
+pub const TURN_LIMIT_RAD_S: f64 = std::f64::consts::PI;
 
 /// One sampling instant.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -55,6 +45,19 @@ pub struct Track {
 pub type Rmse = [f64; 3];
 
 impl Track {
+    fn of(record: &Record, task: &TaskSpec) -> Self {
+        let sampled = record.steps.iter().filter(|step| step.seen.is_some());
+        let samples: Vec<Sample> = sampled
+            .map(|step| Sample {
+                time_s: step.time_s,
+                truth: record.home.to_local(&step.truth),
+                estimate: step.estimate.map(|e| e.pose),
+            })
+            .collect();
+        let straight_m = record.home.to_local(&record.first().truth).position().norm() - task.arrival_radius_m;
+        Self { samples, home: record.outcome == Outcome::Home, straight_s: straight_m / task.speed_m_s }
+    }
+
     /// Time at which the robot came within Rc; `None` if it did not.
     #[must_use]
     pub fn time_s(&self) -> Option<f64> {
@@ -90,138 +93,73 @@ pub fn polar_errors(truth: &Pose, estimate: &Pose) -> [f64; 3] {
     [100.0 * (e.norm() - t.norm()), wrap(angle_of(e) - angle_of(t)), wrap(estimate.heading - truth.heading)]
 }
 
-/// Drives `method` from `start` (home frame) until it is truly within Rc, stops by itself, or is out of time. The truth is integrated by Dormand and Prince's method between sampling instants, the
-/// odometry is the command itself. `compass` says whether the method is told the true heading.
-pub fn drive(terms: &Terms, start: Pose, eyes: &mut Eyes<'_>, compass: bool, method: &mut dyn Method) -> Track {
-    let mut truth = start;
-    let mut odometry = Odometry::default();
-    let mut samples = Vec::new();
-    loop {
-        let time_s = samples.len() as f64 * terms.period_s;
-        let bearings = eyes(&truth);
-        let compass_rad = compass.then_some(truth.heading);
-        let decision = method.step(&Observation { time_s, odometry, bearings: &bearings, compass_rad, panorama: None });
-        samples.push(Sample { time_s, truth, estimate: decision.estimate.map(|e| e.pose) });
-        let home = truth.position().norm() <= terms.radius_m;
-        let twist = decision.command;
-        let over = decision.status != Status::Running || time_s >= terms.limit_s;
-        if home || over || !(twist.v.is_finite() && twist.omega.is_finite()) {
-            let straight_s = (start.position().norm() - terms.radius_m) / terms.speed_m_s;
-            return Track { samples, home, straight_s };
-        }
-        truth = moved(truth, twist, terms.period_s);
-        odometry = Odometry { twist, dt_s: terms.period_s };
-    }
+/// Ts, v, Rc and the time limit of the paper's runs stand in the task of `world`. Its robot is made one without limits of its own but for
+/// [`TURN_LIMIT_RAD_S`].
+#[must_use]
+pub fn unlimited(world: &World) -> World {
+    let mut world = world.clone();
+    let robot = &mut world.spec.robot;
+    (robot.track_m, robot.max_turn_rate_rad_s, robot.max_acceleration_m_s2) = (0.23, TURN_LIMIT_RAD_S, 10.0);
+    robot.max_speed_m_s = world.spec.task.speed_m_s;
+    world
 }
 
-/// The unicycle (1) in Cartesian form, which has no singularity at home.
-fn moved(pose: Pose, twist: Twist, dt: f64) -> Pose {
-    let slope = |s: &[f64; 3]| {
-        let (sin, cos) = sin_cos(s[2]);
-        [twist.v * cos, twist.v * sin, twist.omega]
-    };
-    let [x, y, heading] = integrate(slope, [pose.x, pose.y, pose.heading], dt, Tolerance::TIGHT);
-    Pose::new(x, y, heading)
+/// The paper's filter under one of its laws, started at `initial` (home frame).
+#[must_use]
+pub fn paper_ekf(law: Law, beta: f64, paper: PaperSettings, initial: Pose) -> Setup {
+    Setup { paper, pace: Pace::Constant { beta }, initial_estimate: Some(initial), ..method(MethodKind::PaperEkf, law) }
 }
 
-/// The paper's filter and one of its laws, as printed.
-pub struct PaperPilot {
-    law: PrintedLaw,
-    ids: [LandmarkId; 3],
-    home: [f64; 3],
-    settings: PaperSettings,
-    initial: Pose,
-    filter: Option<PaperEkf>,
+/// A method under the paper's stop rule: homing vectors at the paper's pace, the anchored filter at its own, which slows down to
+/// turn and stops when it is sure to be home. None of them is told where it starts.
+#[must_use]
+pub fn method(method: MethodKind, law: Law) -> Setup {
+    let pace = Pace::Constant { beta: BETA };
+    Setup { plant: PlantKind::Unicycle, method, law, pace, stop: StopRule::Reached, ..Setup::default() }
 }
 
-impl PaperPilot {
-    /// On the first three landmarks of the home snapshot, started at `initial`; `None` if there are fewer.
-    #[must_use]
-    pub fn new(law: PrintedLaw, settings: PaperSettings, home: &HomeSnapshot, initial: Pose) -> Option<Self> {
-        let three: [Bearing; 3] = home.bearings.get(..3)?.try_into().ok()?;
-        let (ids, home) = (three.map(|b| b.id), three.map(|b| b.azimuth_rad));
-        Some(Self { law, ids, home, settings, initial, filter: None })
-    }
-}
-
-impl Method for PaperPilot {
-    fn step(&mut self, observation: &Observation<'_>) -> Decision {
-        let seen = self.ids.map(|id| observation.bearings.iter().find(|b| b.id == id).map(|b| b.azimuth_rad));
-        let filter = self.filter.get_or_insert_with(|| {
-            // A landmark that is not seen at the start: its bearing as the supposed pose would have it far away.
-            let first = std::array::from_fn(|k| seen[k].unwrap_or(self.home[k] - self.initial.heading));
-            PaperEkf::new(self.settings, self.home, first, self.initial)
-        });
-        if observation.odometry.dt_s > 0.0 {
-            filter.predict(observation.odometry.twist, observation.odometry.dt_s);
-            filter.update(seen);
-        }
-        let estimate = filter.estimate();
-        Decision {
-            command: Twist { v: self.law.speed_m_s, omega: self.law.turn_rate(&estimate.pose) },
-            estimate: Some(estimate),
-            status: Status::Running,
-            matched: seen.iter().flatten().count(),
-            rejected: 0,
-            nis: f64::NAN,
-        }
-    }
-}
-
-/// Limit of everyone's turn rate, rad/s: what the paper's proportional law asks for at most. With the paper's constants the nonlinear
-/// one asks for less.
-pub const TURN_LIMIT_RAD_S: f64 = std::f64::consts::PI;
-
-/// The anchored filter, told nothing, with its own controller: it slows down to turn and to stop, and stops when it is sure to be home.
+/// Runs `setup` from `start` (home frame) with the bearings that `eyes` tells.
 ///
 /// # Errors
-/// When there are fewer than three landmarks.
-pub fn anchored(law: Law, terms: &Terms, home: &HomeSnapshot) -> Result<Box<dyn Method>> {
-    let law = match law {
-        Law::Proportional => LawKind::Proportional,
-        Law::Lyapunov => LawKind::Lyapunov,
-    };
-    let robot = RobotSheet {
-        track_m: 0.23,
-        camera_offset_m: [0.0; 2],
-        max_speed_m_s: terms.speed_m_s,
-        max_turn_rate_rad_s: TURN_LIMIT_RAD_S,
-        max_acceleration_m_s2: 10.0,
-    };
-    let task = TaskSheet { speed_m_s: terms.speed_m_s, control_period_s: terms.period_s, arrival_radius_m: terms.radius_m };
-    let briefing = Briefing { home: home.clone(), robot, task, compass: false, camera: None };
-    method::build(MethodKind::AnchoredEkf, law, FilterSettings::default(), briefing, None)
+/// When the method needs more landmarks than there are.
+pub fn run<'a>(world: &'a World, setup: &Setup, start: Pose, eyes: Eyes<'a>) -> Result<Track> {
+    let parts = Parts::with_sensor(world, setup.plant, Box::new(Sighted { home_pose: world.home, eyes }));
+    let mut simulation = Simulation::from_parts(world, setup, parts);
+    let record = simulation.run_from(0, world.home.compose(&start), &mut |_| ControlFlow::Continue(()))?;
+    Ok(Track::of(&record, &world.spec.task))
 }
 
-/// A homing vector at constant speed, steered by the same two laws: proportionally to the angle between heading and vector,
-/// or by a relay at the yaw rate beta v / Rc.
-pub struct VectorPilot<'a> {
-    /// What the vector is made of.
-    pub vector: VectorLaw,
-    /// How it steers.
-    pub law: PrintedLaw,
-    /// What was seen at home.
-    pub home: &'a HomeSnapshot,
+/// What sees landmarks.
+pub struct Eyes<'a> {
+    /// What they saw at home.
+    pub home: HomeSnapshot,
+    /// What they see from a pose in the home frame. They may count their looks, to draw noise.
+    pub look: Box<dyn FnMut(&Pose) -> Vec<Bearing> + Send + 'a>,
+    /// Whether a compass comes with them that tells the true heading.
+    pub compass: bool,
 }
 
-impl Method for VectorPilot<'_> {
-    fn step(&mut self, observation: &Observation<'_>) -> Decision {
-        let home = |id| self.home.bearings.iter().find(|h| h.id == id).map(|h| h.azimuth_rad);
-        let pairs = |heading: f64| -> Vec<(f64, f64)> {
-            let seen = observation.bearings.iter();
-            seen.filter_map(|b| Some((home(b.id)?, b.azimuth_rad + heading))).collect()
-        };
-        let heading = observation.compass_rad.unwrap_or_else(|| align(&pairs(0.0)));
-        let pairs = pairs(heading);
-        // A robot somewhere opposite to the vector, facing as this one does: the law then steers along the vector.
-        let place = -self.vector.vector(&pairs);
-        Decision {
-            command: Twist { v: self.law.speed_m_s, omega: self.law.turn_rate(&Pose::new(place.x, place.y, heading)) },
-            estimate: None,
-            status: Status::Running,
-            matched: pairs.len(),
-            rejected: 0,
-            nis: f64::NAN,
-        }
+/// Eyes as a sensor.
+struct Sighted<'a> {
+    home_pose: Pose,
+    eyes: Eyes<'a>,
+}
+
+impl Sensor for Sighted<'_> {
+    /// The noise is drawn where the eyes are made.
+    fn reset(&mut self, _seed: Seed) -> Result<()> {
+        Ok(())
+    }
+
+    fn home(&self) -> &HomeSnapshot {
+        &self.eyes.home
+    }
+
+    fn observe(&mut self, truth: Pose, _bodies: &[Pose]) -> Result<Vec<Bearing>> {
+        Ok((self.eyes.look)(&self.home_pose.to_local(&truth)))
+    }
+
+    fn compass_rad(&mut self, truth: Pose) -> Option<f64> {
+        self.eyes.compass.then(|| wrap(truth.heading - self.home_pose.heading))
     }
 }

@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use super::rows::{ERROR, PANIC, Row};
 use super::spec::{Chunk, Study};
 use super::value::Value;
-use crate::episode::{Bench, Look, Progress, Record, Setup, Summary};
+use crate::episode::{Look, Progress, Record, Setup, Simulation, Summary};
 use crate::error::{Error, Result};
 use crate::render::Scene;
 use crate::world::World;
@@ -147,21 +147,21 @@ struct Packed {
 }
 
 /// The bench of a cell, packed anew only where the last one was of another world or other looks.
-fn bench_of<'a>(packed: &mut Option<Packed>, world: &'a World, setup: &'a Setup) -> Result<Bench<'a>> {
+fn bench_of<'a>(packed: &mut Option<Packed>, world: &'a World, setup: &'a Setup) -> Result<Simulation<'a>> {
     if let Some(Packed { world_sha256, looks, scenes }) = packed
         && *world_sha256 == world.sha256
         && *looks == setup.looks()
     {
-        return Bench::with_scenes(world, setup, scenes.clone());
+        return Simulation::with_scenes(world, setup, scenes.clone());
     }
-    let bench = Bench::new(world, setup)?;
+    let bench = Simulation::new(world, setup)?;
     let keep = |scenes| Packed { world_sha256: world.sha256.clone(), looks: setup.looks(), scenes };
     *packed = bench.scenes().map(keep);
     Ok(bench)
 }
 
 fn run_episode<'a>(
-    bench: &mut Option<Bench<'a>>,
+    bench: &mut Option<Simulation<'a>>,
     packed: &mut Option<Packed>,
     world: &'a World,
     setup: &'a Setup,

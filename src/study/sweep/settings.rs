@@ -9,10 +9,11 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 
 use super::value::Value;
-use crate::episode::{Bearings, PlantKind, Setup, Start};
+use crate::control::Law;
+use crate::episode::{PlantKind, SensorKind, Setup, Start};
 use crate::error::{Error, Result};
 use crate::estimation::anchored::FilterSettings;
-use crate::method::{LawKind, MethodKind};
+use crate::method::MethodKind;
 use crate::render::RendererChoice;
 use crate::study::compare::{CONTENDERS, pick};
 use crate::vision::{ExtractorSettings, Landmarks};
@@ -42,16 +43,14 @@ const SETTINGS: &[(&str, &str, Apply)] = &[
     }),
     // Before those that a method's name implies, so that what is said of them beside it holds.
     ("method", "homing method, by its name in `wayhome compare`", |case, value| set_method(&mut case.setup, text(value)?)),
-    ("controller", "steering law", |case, value| {
-        choose(&mut case.setup.law, &[LawKind::Proportional, LawKind::Lyapunov], value)
-    }),
+    ("controller", "steering law", |case, value| choose(&mut case.setup.law, &[Law::Proportional, Law::Lyapunov], value)),
     ("compass_deg", "standard deviation of the compass, degrees", |case, value| {
         case.setup.compass_sd_rad = Some(at_least_0(value)?.to_radians());
         Ok(())
     }),
     ("plant", "what moves", |case, value| choose(&mut case.setup.plant, &[PlantKind::Rapier, PlantKind::Unicycle], value)),
     ("bearings", "where bearings come from", |case, value| {
-        choose(&mut case.setup.bearings, &[Bearings::Rendered, Bearings::Ideal, Bearings::Noisy], value)
+        choose(&mut case.setup.sensor, &[SensorKind::Rendered, SensorKind::Ideal, SensorKind::Noisy], value)
     }),
     ("landmarks", "what a landmark of rendered bearings is", |case, value| {
         choose(&mut case.setup.extractor.landmarks, &[Landmarks::Features, Landmarks::Objects], value)
@@ -95,12 +94,14 @@ const SETTINGS: &[(&str, &str, Apply)] = &[
         Ok(())
     }),
     ("noise_deg", "standard deviation of noisy bearings, degrees", |case, value| {
-        case.setup.noise.sd_rad = at_least_0(value)?.to_radians();
+        case.setup.noise.get_or_insert_default().sd_rad = at_least_0(value)?.to_radians();
         Ok(())
     }),
-    ("noise_dropout", "share of noisy bearings that are missed", |case, value| set_share(&mut case.setup.noise.dropout, value)),
+    ("noise_dropout", "share of noisy bearings that are missed", |case, value| {
+        set_share(&mut case.setup.noise.get_or_insert_default().dropout, value)
+    }),
     ("noise_false", "share of noisy bearings that are false", |case, value| {
-        set_share(&mut case.setup.noise.false_match, value)
+        set_share(&mut case.setup.noise.get_or_insert_default().false_match, value)
     }),
     ("hidden_share", "share of the home landmarks never seen on the way", |case, value| {
         set_share(&mut case.setup.degradation.hidden, value)
@@ -246,7 +247,7 @@ fn set_method(setup: &mut Setup, name: &str) -> std::result::Result<(), Refusal>
     let found = pick(&[name.to_owned()]).map_err(|_| keys())?;
     let contender = found.first().ok_or_else(keys)?;
     setup.method = contender.method.clone();
-    if contender.law != LawKind::Proportional {
+    if contender.law != Law::Proportional {
         setup.law = contender.law;
     }
     if contender.compass {

@@ -11,11 +11,12 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
+use crate::episode::Recorder;
 use crate::error::{Error, Result};
-use crate::record::run as run_report;
+use crate::record::run::RunFiles;
 use crate::storage::{MARKER, files, remove};
-use crate::storage::{OutputFolder, json, write_atomically};
 use crate::storage::{PARTIAL, io_error};
+use crate::storage::{json, write_atomically};
 use crate::study::sweep::merge::{Identity, merge};
 use crate::study::sweep::{Chunk, Failure, Row, Store, Study, rows};
 use crate::table::Table;
@@ -293,8 +294,7 @@ impl Store for StudyFolder {
             return Ok(());
         }
         let path = self.path.join(FAILURES).join(format!("{:08}", failure.row.episode));
-        let folder = OutputFolder::open(&path, "sweep --keep-failures", run_report::FILES)?;
-        run_report::write(folder, failure.world, failure.record, failure.summary)
+        RunFiles::open(&path, "sweep --keep-failures", failure.world)?.finish(failure.record, failure.summary)
     }
 }
 

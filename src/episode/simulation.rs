@@ -1,0 +1,730 @@
+//! A simulation that a caller steps: reset it, look, command, look again.
+
+use std::ops::ControlFlow;
+use std::sync::Arc;
+use std::time::Instant;
+
+use super::parts::{Parts, PlantMaker, Shared};
+use super::record::{Ending, Outcome, Pictures, Record, Step, Timing};
+use super::recorder::{Moment, Recorder};
+use super::setup::{Setup, StopRule};
+use super::summary::Summary;
+use crate::error::{Error, Result};
+use crate::geometry::{Pose, Twist, wrap};
+use crate::method;
+use crate::observation::{Bearing, Briefing, Decision, Estimate, Method, Observation, Odometry, Status};
+use crate::panorama::Panorama;
+use crate::physics::{Collision, Plant};
+use crate::random::Seed;
+use crate::render::Scene;
+use crate::sensor::Sensor;
+use crate::world::{TaskSpec, World};
+
+/// Longest time given to the robot to coast to rest after the end, s.
+const REST_LIMIT_S: f64 = 1.0;
+/// Speeds below which the robot is at rest, m/s and rad/s.
+const REST_TWIST: Twist = Twist { v: 1e-3, omega: 5e-3 };
+
+/// A robot is stuck when it was told to move all through this time, s ...
+const STUCK_WINDOW_S: f64 = 5.0;
+/// ... and stayed within this distance, m, ...
+const STUCK_DISTANCE_M: f64 = 0.02;
+/// ... and this angle of where it is, rad.
+const STUCK_TURN_RAD: f64 = 0.1;
+/// Commands below these count as not told to move, m/s and rad/s.
+const IDLE_TWIST: Twist = Twist { v: 0.005, omega: 0.02 };
+
+/// How an episode stands, as its surroundings see it. What a method thinks of it is [`Status`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Phase {
+    /// On the way.
+    Running,
+    /// The robot truly is within the arrival radius, under [`StopRule::Reached`].
+    Reached,
+    /// The time limit has come.
+    OutOfTime,
+    /// The robot was told to move for some seconds and did not.
+    Stuck,
+}
+
+/// State of a running episode, for a watcher.
+#[derive(Debug, Clone, Copy)]
+pub struct Progress {
+    /// Simulated time, s.
+    pub time_s: f64,
+    /// True distance to home, m.
+    pub distance_m: f64,
+    /// The method's belief.
+    pub estimate: Option<Estimate>,
+}
+
+/// Is shown the state once a control step, and says whether to go on.
+pub type Watch<'a> = dyn FnMut(&Progress) -> ControlFlow<()> + 'a;
+
+/// A robot in a world, one control step at a time.
+///
+/// [`reset`](Self::reset) puts it at the start of a seed's run and tells the first observation; [`step`](Self::step) holds a command for a
+/// control period and tells the next one. An [`Observation`] holds nothing of the truth; a caller who is no method finds that in
+/// [`truth`](Self::truth), [`bodies`](Self::bodies) and [`steps`](Self::steps). [`run`](Self::run) closes the loop with the method that the
+/// setup names, [`run_method`](Self::run_method) with any other.
+///
+/// ```
+/// use wayhome::episode::{Phase, PlantKind, SensorKind, Setup, Simulation};
+/// use wayhome::geometry::Twist;
+/// use wayhome::world::World;
+///
+/// let world = World::open("lab")?;
+/// let setup = Setup { plant: PlantKind::Unicycle, sensor: SensorKind::Ideal, ..Setup::default() };
+/// let mut simulation = Simulation::new(&world, &setup)?;
+/// let first = simulation.reset(7)?;
+/// assert!(first.time_s == 0.0 && !first.bearings.is_empty());
+/// let before = simulation.truth();
+/// let (seen, phase) = simulation.step(Twist { v: 0.2, omega: 0.0 })?;
+/// assert!(seen.time_s == 0.1 && seen.odometry.twist.v == 0.2 && phase == Phase::Running);
+/// assert!(((simulation.truth().position() - before.position()).norm() - 0.02).abs() < 1e-12);
+/// # Ok::<(), wayhome::Error>(())
+/// ```
+pub struct Simulation<'a> {
+    world: &'a World,
+    setup: Setup,
+    task: TaskSpec,
+    /// `None` where the parts are a caller's own.
+    shared: Option<Shared>,
+    plant: PlantMaker<'a>,
+    sensor: Box<dyn Sensor + 'a>,
+    recorder: Option<Box<dyn Recorder + 'a>>,
+    episode: Option<Episode<'a>>,
+}
+
+/// The run that is under way.
+struct Episode<'a> {
+    seed: u64,
+    start: Pose,
+    plant: Box<dyn Plant + 'a>,
+    /// Control periods since the start, and the time that other intervals took, s.
+    ticks: usize,
+    other_s: f64,
+    phase: Phase,
+    /// What is sensed at this moment.
+    odometry: Odometry,
+    bearings: Vec<Bearing>,
+    compass_rad: Option<f64>,
+    slip_m_s: [f64; 2],
+    dead_reckoned: Pose,
+    /// All of the past, each row with the command that ended it.
+    steps: Vec<Step>,
+    collisions: Vec<Collision>,
+    /// How many of these there were before the last step.
+    known_collisions: usize,
+    start_picture: Option<Panorama>,
+    began: Instant,
+    timing: Timing,
+}
+
+impl<'a> Simulation<'a> {
+    /// Builds what `setup` names: packs the world and opens the renderer where it needs them.
+    ///
+    /// # Errors
+    /// When [`Setup::check`] finds a fault, the world cannot be packed, the renderer cannot be had, or the set cannot be opened.
+    pub fn new(world: &'a World, setup: &Setup) -> Result<Self> {
+        setup.check()?;
+        Self::shared(world, setup, Shared::new(world, setup)?)
+    }
+
+    /// As [`Simulation::new`], with the scenes of another simulation of an equal world with the same [`Setup::looks`]: packing a world,
+    /// its textures above all, takes longer than a short run.
+    ///
+    /// # Errors
+    /// As [`Simulation::new`].
+    pub fn with_scenes(world: &'a World, setup: &Setup, scenes: [Arc<Scene>; 2]) -> Result<Self> {
+        setup.check()?;
+        Self::shared(world, setup, Shared::with_scenes(world, setup, Some(scenes))?)
+    }
+
+    /// With parts of a caller's own. Of `setup` hold the method, the start, the task and the names in summaries.
+    #[must_use]
+    pub fn from_parts(world: &'a World, setup: &Setup, parts: Parts<'a>) -> Self {
+        let Parts { plant, sensor } = parts;
+        let task = setup.task(world);
+        Self { world, setup: setup.clone(), task, shared: None, plant, sensor, recorder: None, episode: None }
+    }
+
+    fn shared(world: &'a World, setup: &Setup, shared: Shared) -> Result<Self> {
+        let parts = Parts::shared(world, setup, &shared)?;
+        Ok(Self { shared: Some(shared), ..Self::from_parts(world, setup, parts) })
+    }
+
+    /// A second one for another thread; it shares the packed world and has a renderer of its own.
+    ///
+    /// # Errors
+    /// When a second renderer cannot be had, or the parts are a caller's own.
+    pub fn another(&self) -> Result<Self> {
+        let shared = self.shared.clone().ok_or_else(|| Error::Invalid {
+            what: "second simulation".into(),
+            found: "parts of a caller's own".into(),
+            allowed: "parts that the setup names".into(),
+        })?;
+        Self::shared(self.world, &self.setup, shared)
+    }
+
+    /// The packed world as it was at home and as it is on the way; `None` for a sensor without a camera.
+    #[must_use]
+    pub fn scenes(&self) -> Option<[Arc<Scene>; 2]> {
+        self.shared.as_ref()?.scenes.clone()
+    }
+
+    /// The world.
+    #[must_use]
+    pub fn world(&self) -> &'a World {
+        self.world
+    }
+
+    /// The setup.
+    #[must_use]
+    pub fn setup(&self) -> &Setup {
+        &self.setup
+    }
+
+    /// The sensor, for looks from other places than the robot's. It should be reset first.
+    pub fn sensor(&mut self) -> &mut (dyn Sensor + 'a) {
+        self.sensor.as_mut()
+    }
+
+    /// Tells `recorder` of all that happens from the next reset on, in place of the recorder before.
+    pub fn record_to(&mut self, recorder: impl Recorder + 'a) {
+        self.recorder = Some(Box::new(recorder));
+    }
+
+    /// Puts the robot where the run of `seed` starts, and tells what is observed there. The same seed gives the same run.
+    ///
+    /// # Errors
+    /// When there is no such start, or a part fails.
+    pub fn reset(&mut self, seed: u64) -> Result<Observation<'_>> {
+        let start = self.setup.start_pose(self.world, Seed(seed))?;
+        self.reset_at(seed, start)
+    }
+
+    /// The same from a pose in the room, whatever start the setup names.
+    ///
+    /// # Errors
+    /// When a part fails.
+    pub fn reset_at(&mut self, seed: u64, start: Pose) -> Result<Observation<'_>> {
+        let plant = (self.plant)(start, Seed(seed));
+        self.sensor.reset(Seed(seed))?;
+        if let Some(recorder) = &mut self.recorder {
+            recorder.begin(self.sensor.home(), self.sensor.home_panorama())?;
+        }
+        self.episode = Some(Episode {
+            seed,
+            start,
+            ticks: 0,
+            other_s: 0.0,
+            phase: Phase::Running,
+            odometry: Odometry::default(),
+            bearings: Vec::new(),
+            compass_rad: None,
+            slip_m_s: [0.0; 2],
+            dead_reckoned: plant.truth(),
+            plant,
+            steps: Vec::new(),
+            collisions: Vec::new(),
+            known_collisions: 0,
+            start_picture: None,
+            began: Instant::now(),
+            timing: Timing::default(),
+        });
+        self.look()?;
+        let seen = self.sensor.panorama().cloned();
+        self.running_mut()?.start_picture = seen;
+        self.observation()
+    }
+
+    /// What a method is told before the run that was last reset.
+    #[must_use]
+    pub fn briefing(&self) -> Briefing {
+        self.setup.briefing(self.world, self.sensor.as_ref())
+    }
+
+    /// What is observed now.
+    ///
+    /// # Errors
+    /// Before the first reset, and after the end of a run.
+    pub fn observation(&self) -> Result<Observation<'_>> {
+        let episode = self.running()?;
+        Ok(Observation {
+            time_s: episode.time_s(self.task.control_period_s),
+            odometry: episode.odometry,
+            bearings: &episode.bearings,
+            compass_rad: episode.compass_rad,
+            panorama: self.sensor.panorama().map(Panorama::picture),
+        })
+    }
+
+    /// Holds a command for one control period, and tells what is observed then and how the episode stands. A command that no number
+    /// describes counts as a stop.
+    ///
+    /// # Errors
+    /// Before the first reset, and when a part or the recorder fails.
+    pub fn step(&mut self, command: Twist) -> Result<(Observation<'_>, Phase)> {
+        self.step_for(command, None)
+    }
+
+    /// The same for another interval, s; `None` is the control period.
+    ///
+    /// # Errors
+    /// As [`Simulation::step`].
+    pub fn step_for(&mut self, command: Twist, interval_s: Option<f64>) -> Result<(Observation<'_>, Phase)> {
+        self.note(&Decision::command(command))?;
+        self.advance(command, interval_s)?;
+        Ok((self.observation()?, self.running()?.phase))
+    }
+
+    /// How the episode stands; running before the first reset.
+    #[must_use]
+    pub fn phase(&self) -> Phase {
+        self.episode.as_ref().map_or(Phase::Running, |episode| episode.phase)
+    }
+
+    /// True pose of the robot in the room; home before the first reset.
+    #[must_use]
+    pub fn truth(&self) -> Pose {
+        self.episode.as_ref().map_or(self.world.home, |episode| episode.plant.truth())
+    }
+
+    /// What moves, with what its wheels do; `None` before the first reset.
+    #[must_use]
+    pub fn plant(&self) -> Option<&dyn Plant> {
+        Some(self.episode.as_ref()?.plant.as_ref())
+    }
+
+    /// True poses of the bodies, in the order of `World::bodies`.
+    #[must_use]
+    pub fn bodies(&self) -> &[Pose] {
+        self.episode.as_ref().map_or(&[], |episode| episode.plant.body_poses())
+    }
+
+    /// The record so far: truth, odometry, command and belief of all steps that were left.
+    #[must_use]
+    pub fn steps(&self) -> &[Step] {
+        self.episode.as_ref().map_or(&[], |episode| &episode.steps)
+    }
+
+    /// Contacts of the run so far.
+    #[must_use]
+    pub fn collisions(&self) -> &[Collision] {
+        self.episode.as_ref().map_or(&[], |episode| &episode.collisions)
+    }
+
+    /// Forgets the steps and contacts so far, so that a run of any length needs no more memory than a short one.
+    pub fn forget(&mut self) {
+        if let Some(episode) = &mut self.episode {
+            episode.steps.clear();
+            episode.collisions.clear();
+            episode.known_collisions = 0;
+        }
+    }
+
+    /// Runs the episode of one seed with the setup's method. `watch` stops the run with `Break`.
+    ///
+    /// # Errors
+    /// When there is no such start, the method cannot be built from what it is told, a part fails, or `watch` breaks.
+    pub fn run(&mut self, seed: u64, watch: &mut Watch<'_>) -> Result<Record> {
+        self.reset(seed)?;
+        self.run_own(watch)
+    }
+
+    /// The same from a pose in the room, whatever start the setup names.
+    ///
+    /// # Errors
+    /// As [`Simulation::run`].
+    pub fn run_from(&mut self, seed: u64, start: Pose, watch: &mut Watch<'_>) -> Result<Record> {
+        self.reset_at(seed, start)?;
+        self.run_own(watch)
+    }
+
+    /// The same with a method of a caller's own, which is built from what methods are told.
+    ///
+    /// # Errors
+    /// As [`Simulation::run`], and what `build` fails with.
+    pub fn run_method(
+        &mut self,
+        seed: u64,
+        build: impl FnOnce(Briefing) -> Result<Box<dyn Method>>,
+        watch: &mut Watch<'_>,
+    ) -> Result<Record> {
+        self.reset(seed)?;
+        let mut method = build(self.briefing())?;
+        self.close_loop(method.as_mut(), watch)
+    }
+
+    fn run_own(&mut self, watch: &mut Watch<'_>) -> Result<Record> {
+        let options = self.setup.method_options(self.world, &self.running()?.start);
+        let mut method = method::build(self.setup.method.clone(), &options, self.briefing())?;
+        self.close_loop(method.as_mut(), watch)
+    }
+
+    /// The loop: observe, decide, move, until the method says that it is over, the time limit, or a robot that is stuck. Then the
+    /// robot comes to rest, and the distance from there to home decides whether a claim to be home is right.
+    fn close_loop(&mut self, method: &mut dyn Method, watch: &mut Watch<'_>) -> Result<Record> {
+        let ending = loop {
+            let deciding = Instant::now();
+            let decision = method.step(&self.observation()?);
+            self.running_mut()?.timing.estimation_s += deciding.elapsed().as_secs_f64();
+            self.note(&decision)?;
+            let time_s = self.running()?.time_s(self.task.control_period_s);
+            let progress = Progress { time_s, distance_m: self.distance_m(), estimate: decision.estimate };
+            if watch(&progress).is_break() {
+                return Err(Error::Interrupted);
+            }
+            match (self.phase(), decision.status) {
+                (Phase::Reached, _) => break Ending::Reached,
+                (_, Status::Arrived) => break Ending::Claimed,
+                (_, Status::Lost) => break Ending::GaveUp,
+                (_, Status::Failed) => break Ending::Broke,
+                (Phase::OutOfTime, Status::Running) => break Ending::OutOfTime,
+                (Phase::Stuck, Status::Running) => break Ending::Stuck,
+                (Phase::Running, Status::Running) => {}
+            }
+            // A method that commands what no number describes has lost its way; the plant must not inherit it.
+            if !(decision.command.v.is_finite() && decision.command.omega.is_finite()) {
+                break Ending::GaveUp;
+            }
+            self.advance(decision.command, None)?;
+        };
+        self.finish(ending, method.failure().map(str::to_owned))
+    }
+
+    /// Ends the run: stops the robot, waits until it rests, tells the recorder, and hands the record over. A run that is stepped by
+    /// hand needs no end but for its record.
+    ///
+    /// # Errors
+    /// Before the first reset, and when the recorder fails.
+    pub fn finish(&mut self, ending: Ending, failure: Option<String>) -> Result<Record> {
+        self.running()?;
+        let end = self.sensor.panorama().cloned();
+        self.come_to_rest()?;
+        let Some(episode) = self.episode.take() else { return Err(not_reset()) };
+        let Episode { seed, steps, collisions, start_picture, timing, began, .. } = episode;
+        let ended = steps.iter().rev().find(|step| step.seen.is_some()).map_or(0.0, |step| step.time_s);
+        let mut record = Record {
+            outcome: Outcome::Lost,
+            claimed_home: ending == Ending::Claimed,
+            failure,
+            time_s: ended,
+            collisions,
+            home: self.world.home,
+            home_bearings: self.sensor.home().bearings.len(),
+            pictures: Pictures { home: self.sensor.home_panorama().cloned(), start: start_picture, end },
+            renderer: self.sensor.renderer().cloned(),
+            steps,
+            timing,
+        };
+        let is_home = record.final_distance_m() <= self.task.arrival_radius_m;
+        record.outcome = ending.outcome(is_home);
+        let sensing = self.sensor.timing();
+        let wall_s = began.elapsed().as_secs_f64();
+        record.timing = Timing {
+            render_s: sensing.render_s,
+            vision_s: sensing.vision_s,
+            wall_s,
+            real_time_factor: record.last().time_s / wall_s.max(1e-9),
+            ..record.timing
+        };
+        if let Some(recorder) = &mut self.recorder {
+            recorder.finish(&record, &Summary::new(&record, self.world, &self.setup, seed))?;
+        }
+        Ok(record)
+    }
+
+    fn running(&self) -> Result<&Episode<'a>> {
+        self.episode.as_ref().ok_or_else(not_reset)
+    }
+
+    fn running_mut(&mut self) -> Result<&mut Episode<'a>> {
+        self.episode.as_mut().ok_or_else(not_reset)
+    }
+
+    fn distance_m(&self) -> f64 {
+        (self.truth().position() - self.world.home.position()).norm()
+    }
+
+    /// Senses from where the robot is now.
+    fn look(&mut self) -> Result<()> {
+        let Some(episode) = &mut self.episode else { return Err(not_reset()) };
+        let truth = episode.plant.truth();
+        episode.bearings = self.sensor.observe(truth, episode.plant.body_poses())?;
+        episode.compass_rad = self.sensor.compass_rad(truth);
+        let reached = self.setup.stop == StopRule::Reached && self.distance_m() <= self.task.arrival_radius_m;
+        let task = self.task;
+        let episode = self.running_mut()?;
+        episode.phase = if reached {
+            Phase::Reached
+        } else if episode.time_s(task.control_period_s) >= task.time_limit_s {
+            Phase::OutOfTime
+        } else if episode.is_stuck(task.control_period_s) {
+            Phase::Stuck
+        } else {
+            Phase::Running
+        };
+        Ok(())
+    }
+
+    /// Writes down what was observed and what was decided on it.
+    fn note(&mut self, decision: &Decision) -> Result<()> {
+        let Some(episode) = &mut self.episode else { return Err(not_reset()) };
+        let row = Step {
+            command: decision.command,
+            estimate: decision.estimate,
+            seen: Some(episode.bearings.len()),
+            matched: decision.matched,
+            rejected: decision.rejected,
+            nis: decision.nis,
+            ..episode.row(self.task.control_period_s)
+        };
+        episode.steps.push(row);
+        if let Some(recorder) = &mut self.recorder {
+            recorder.record(&episode.moment(&row, &episode.bearings, self.sensor.panorama()))?;
+        }
+        Ok(())
+    }
+
+    /// Moves, and senses.
+    fn advance(&mut self, command: Twist, interval_s: Option<f64>) -> Result<()> {
+        let period_s = self.task.control_period_s;
+        self.running_mut()?.step(command, interval_s, period_s);
+        self.look()
+    }
+
+    /// Commands zero until the robot rests, one row a period.
+    fn come_to_rest(&mut self) -> Result<()> {
+        let period_s = self.task.control_period_s;
+        let Some(episode) = &mut self.episode else { return Err(not_reset()) };
+        for _ in 0..(REST_LIMIT_S / period_s).ceil() as usize {
+            let before = episode.plant.truth();
+            episode.step(Twist::default(), None, period_s);
+            let row = episode.row(period_s);
+            if let Some(recorder) = &mut self.recorder {
+                recorder.record(&episode.moment(&row, &[], None))?;
+            }
+            episode.steps.push(row);
+            let moved = (row.truth.position() - before.position()).norm();
+            let turned = wrap(row.truth.heading - before.heading).abs();
+            if moved < REST_TWIST.v * period_s && turned < REST_TWIST.omega * period_s {
+                break;
+            }
+        }
+        Ok(())
+    }
+}
+
+fn not_reset() -> Error {
+    Error::Invalid { what: "simulation".into(), found: "no run under way".into(), allowed: "one that was reset".into() }
+}
+
+impl Episode<'_> {
+    fn time_s(&self, period_s: f64) -> f64 {
+        self.ticks as f64 * period_s + self.other_s
+    }
+
+    /// Moves for one interval.
+    fn step(&mut self, command: Twist, interval_s: Option<f64>, period_s: f64) {
+        let moving = Instant::now();
+        let moved = self.plant.step(command, interval_s.unwrap_or(period_s));
+        self.timing.physics_s += moving.elapsed().as_secs_f64();
+        match interval_s {
+            None => self.ticks += 1,
+            Some(interval_s) => self.other_s += interval_s,
+        }
+        self.odometry = moved.odometry;
+        self.slip_m_s = moved.slip_m_s;
+        self.known_collisions = self.collisions.len();
+        self.collisions.extend_from_slice(self.plant.collisions());
+        self.dead_reckoned = self.dead_reckoned.advanced(moved.odometry.twist, moved.odometry.dt_s);
+    }
+
+    /// A row that says where the plant is, without an observation or a command.
+    fn row(&self, period_s: f64) -> Step {
+        Step {
+            time_s: self.time_s(period_s),
+            truth: self.plant.truth(),
+            dead_reckoned: self.dead_reckoned,
+            odometry: self.odometry.twist,
+            slip_m_s: self.slip_m_s,
+            command: Twist::default(),
+            estimate: None,
+            seen: None,
+            matched: 0,
+            rejected: 0,
+            nis: f64::NAN,
+        }
+    }
+
+    /// What a recorder is told of a step.
+    fn moment<'m>(&'m self, step: &'m Step, bearings: &'m [Bearing], panorama: Option<&'m Panorama>) -> Moment<'m> {
+        let collisions = &self.collisions[self.known_collisions..];
+        Moment { step, bearings, panorama, bodies: self.plant.body_poses(), collisions }
+    }
+
+    /// Whether the robot was told to move during the whole window before now and did not.
+    fn is_stuck(&self, period_s: f64) -> bool {
+        let window = (STUCK_WINDOW_S / period_s).ceil() as usize;
+        let Some(first) = self.steps.len().checked_sub(window) else { return false };
+        let now = self.plant.truth();
+        self.steps[first..].iter().all(|s| {
+            (s.command.v.abs() >= IDLE_TWIST.v || s.command.omega.abs() >= IDLE_TWIST.omega)
+                && (s.truth.position() - now.position()).norm() < STUCK_DISTANCE_M
+                && wrap(s.truth.heading - now.heading).abs() < STUCK_TURN_RAD
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::setup::{SensorKind, Start};
+    use super::*;
+    use crate::observation::HomeSnapshot;
+    use crate::physics::PlantStep;
+
+    /// Moves as told along a line, short of a wall; coasts for one period after the command ends.
+    struct Track {
+        pose: Pose,
+        wall_x: f64,
+        last_v: f64,
+    }
+
+    impl Plant for Track {
+        fn step(&mut self, command: Twist, dt_s: f64) -> PlantStep {
+            let v = 0.5 * (command.v + self.last_v);
+            self.last_v = command.v;
+            self.pose.x = (self.pose.x + v * dt_s).min(self.wall_x);
+            PlantStep { odometry: Odometry { twist: Twist { v, omega: 0.0 }, dt_s }, ..PlantStep::default() }
+        }
+        fn truth(&self) -> Pose {
+            self.pose
+        }
+        fn body_poses(&self) -> &[Pose] {
+            &[]
+        }
+    }
+
+    struct Blind(HomeSnapshot);
+
+    impl Sensor for Blind {
+        fn reset(&mut self, _: Seed) -> Result<()> {
+            Ok(())
+        }
+        fn home(&self) -> &HomeSnapshot {
+            &self.0
+        }
+        fn observe(&mut self, _: Pose, _: &[Pose]) -> Result<Vec<Bearing>> {
+            Ok(Vec::new())
+        }
+    }
+
+    /// Drives at 0.2 m/s until a time and then says something.
+    struct Script {
+        until_s: f64,
+        then: Status,
+        v: f64,
+    }
+
+    impl Method for Script {
+        fn step(&mut self, observation: &Observation<'_>) -> Decision {
+            let ended = observation.time_s >= self.until_s;
+            let command = Twist { v: self.v, omega: 0.0 };
+            Decision { status: if ended { self.then } else { Status::Running }, ..Decision::command(command) }
+        }
+    }
+
+    /// A world with home at the origin.
+    fn world() -> World {
+        let text = "name = \"track\"\nroom.outline_m = [[-9, -9], [9, -9], [9, 9], [-9, 9]]\nhome = { x_m = 1, y_m = 0 }\n\
+                    task = { time_limit_s = 20 }";
+        World::from_toml(text, "track.toml").unwrap()
+    }
+
+    fn parts<'a>(wall_x: f64) -> Parts<'a> {
+        let plant = move |pose, _| -> Box<dyn Plant> { Box::new(Track { pose, wall_x, last_v: 0.0 }) };
+        Parts { plant: Box::new(plant), sensor: Box::new(Blind(HomeSnapshot::default())) }
+    }
+
+    fn run(wall_x: f64, script: Script, watch: &mut Watch<'_>) -> Result<Record> {
+        let (world, setup) = (world(), Setup { start: Start::At(Pose::IDENTITY), ..Setup::default() });
+        let mut simulation = Simulation::from_parts(&world, &setup, parts(wall_x));
+        simulation.run_method(1, |_| Ok(Box::new(script)), watch)
+    }
+
+    /// Home lies 1 m ahead of the start.
+    fn episode(wall_x: f64, script: Script) -> Record {
+        run(wall_x, script, &mut |_| ControlFlow::Continue(())).unwrap()
+    }
+
+    fn script(until_s: f64, then: Status) -> Script {
+        Script { until_s, then, v: 0.2 }
+    }
+
+    #[test]
+    fn a_claim_counts_where_the_robot_rests() {
+        let right = episode(9.0, script(5.0, Status::Arrived));
+        assert_eq!((right.outcome, right.claimed_home, right.time_s), (Outcome::Home, true, 5.0));
+        // 0.2 m/s for 5 s, half of that in the first period, and half of that again in the period after the stop.
+        assert!(right.final_distance_m() < 1e-12, "{}", right.final_distance_m());
+        assert!(right.last().time_s > 5.0 && right.last().seen.is_none() && right.odometry_drift_m() < 1e-12);
+        let wrong = episode(9.0, script(4.0, Status::Arrived));
+        assert_eq!((wrong.outcome, wrong.claimed_home), (Outcome::Lost, true));
+        assert!((wrong.final_distance_m() - 0.2).abs() < 1e-12);
+    }
+
+    #[test]
+    fn other_ends_are_told_apart() {
+        let lost = episode(9.0, script(1.0, Status::Lost));
+        assert_eq!((lost.outcome, lost.claimed_home, lost.time_s), (Outcome::Lost, false, 1.0));
+        let late = episode(9.0, script(99.0, Status::Arrived));
+        assert_eq!((late.outcome, late.time_s), (Outcome::Timeout, 20.0));
+        let broken = episode(9.0, Script { until_s: 99.0, then: Status::Arrived, v: f64::NAN });
+        assert_eq!((broken.outcome, broken.time_s), (Outcome::Lost, 0.0));
+        assert!(broken.last().truth.is_finite());
+    }
+
+    #[test]
+    fn only_a_robot_that_is_told_to_move_gets_stuck() {
+        let stuck = episode(0.5, script(99.0, Status::Arrived));
+        assert_eq!(stuck.outcome, Outcome::Stuck);
+        // At the wall after 2.55 s; 5 s later, but for the last 2 cm, it has not moved.
+        assert!((stuck.time_s - 7.5).abs() < 0.2, "{}", stuck.time_s);
+        let waiting = episode(0.5, Script { until_s: 99.0, then: Status::Arrived, v: 0.0 });
+        assert_eq!(waiting.outcome, Outcome::Timeout);
+    }
+
+    #[test]
+    fn a_watcher_can_stop_it() {
+        let stop_after_a_second =
+            &mut |p: &Progress| if p.time_s < 1.0 { ControlFlow::Continue(()) } else { ControlFlow::Break(()) };
+        let result = run(9.0, script(99.0, Status::Arrived), stop_after_a_second);
+        assert!(matches!(result, Err(Error::Interrupted)));
+    }
+
+    /// Whoever steps by hand sees what a method would have seen, and gets the same record.
+    #[test]
+    fn a_run_can_be_stepped_by_hand() {
+        let world = World::open("lab").unwrap();
+        let setup = Setup { sensor: SensorKind::Noisy, ..Setup::default() };
+        let mut simulation = Simulation::new(&world, &setup).unwrap();
+        assert!(simulation.step(Twist::default()).is_err(), "there is nothing to step before a reset");
+        let closed = simulation.run(3, &mut |_| ControlFlow::Continue(())).unwrap();
+        for _ in 0..2 {
+            let start = setup.start_pose(&world, Seed(3)).unwrap();
+            simulation.reset(3).unwrap();
+            let mut method =
+                method::build(setup.method.clone(), &setup.method_options(&world, &start), simulation.briefing()).unwrap();
+            let mut decision = method.step(&simulation.observation().unwrap());
+            while decision.status == Status::Running {
+                let (seen, _) = simulation.step(decision.command).unwrap();
+                decision = method.step(&seen);
+            }
+            let truths: Vec<Pose> = simulation.steps().iter().map(|step| step.truth).collect();
+            let held: Vec<Pose> = closed.steps.iter().take(truths.len()).map(|step| step.truth).collect();
+            assert!(truths.len() > 20 && truths == held);
+        }
+    }
+}
