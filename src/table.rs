@@ -127,7 +127,7 @@ impl Table {
         let schema = Arc::new(Type::group_type_builder("rows").with_fields(fields).build()?);
         let notes = notes.iter().map(|(key, value)| KeyValue::new((*key).to_owned(), value.clone())).collect();
         let properties = WriterProperties::builder()
-            .set_created_by(format!("wayhome {}", env!("CARGO_PKG_VERSION")))
+            .set_created_by(format!("wayhome {}", crate::VERSION))
             .set_key_value_metadata(Some(notes))
             .build();
         let mut bytes = Vec::new();

@@ -41,6 +41,28 @@ fn assert_done(output: &Output) {
     assert_eq!(output.status.code(), Some(0), "{}", stderr(output));
 }
 
+/// What git itself says is checked out is what the program names, in `--version` and in a summary.
+#[test]
+fn the_commit_is_named() {
+    let package = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let git = Command::new("git").arg("-C").arg(package).args(["rev-parse", "HEAD"]).output();
+    let commit = git.ok().filter(|output| output.status.success() && package.join(".git").exists());
+    let expected = match commit.map(|output| String::from_utf8(output.stdout).unwrap()) {
+        Some(commit) => format!("{} ({}", env!("CARGO_PKG_VERSION"), &commit[..7]),
+        None => env!("CARGO_PKG_VERSION").to_owned(),
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let output = run(folder.path(), &["--version"]);
+    assert_done(&output);
+    let printed = String::from_utf8(output.stdout).unwrap();
+    assert!(printed.starts_with(&format!("wayhome {expected}")), "{printed} is not of {expected}");
+    std::fs::write(folder.path().join("drive.csv"), "t_s,v_m_s,omega_rad_s\n0,0.3,0\n0.1,0,0\n").unwrap();
+    assert_done(&run(folder.path(), &["drive", "lab", "--commands", "drive.csv", "--out", "run"]));
+    let summary = std::fs::read_to_string(folder.path().join("run/summary.json")).unwrap();
+    let summary: Value = serde_json::from_str(&summary).unwrap();
+    assert_eq!(summary["version"], printed.trim_start_matches("wayhome ").trim_end());
+}
+
 #[test]
 fn bad_worlds_are_explained() {
     let folder = tempfile::tempdir().unwrap();

@@ -45,7 +45,7 @@ Exit codes:
 
 /// Headless, physics-simulated robot testbed for bearing-only visual homing
 #[derive(Debug, Parser)]
-#[command(version, after_help = EXIT_CODES)]
+#[command(version = wayhome::VERSION, after_help = EXIT_CODES)]
 pub struct Args {
     #[command(flatten)]
     pub common: CommonArgs,

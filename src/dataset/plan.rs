@@ -243,7 +243,7 @@ impl Plan {
             format: "wayhome-dataset/1".into(),
             layout: request.layout,
             command: request.command.clone(),
-            version: env!("CARGO_PKG_VERSION").into(),
+            version: crate::VERSION.into(),
             seed: request.seed,
             licence: request.licence.clone(),
             world: world.spec.name.clone(),

@@ -280,7 +280,7 @@ impl DriveSummary {
             world: world.spec.name.clone(),
             world_sha256: world.sha256.clone(),
             commands_sha256: commands.sha256.clone(),
-            version: env!("CARGO_PKG_VERSION"),
+            version: crate::VERSION,
         }
     }
 

@@ -237,7 +237,7 @@ impl Summary {
             seed,
             world: world.spec.name.clone(),
             world_sha256: world.sha256.clone(),
-            version: env!("CARGO_PKG_VERSION"),
+            version: crate::VERSION,
         }
     }
 

@@ -162,11 +162,12 @@ pub fn inspection(found: &Inspection, folder: &std::path::Path) -> String {
 #[must_use]
 pub fn speed_page(f: &Findings) -> String {
     let mut text = format!(
-        "# Making data sets\n\nMade by `wayhome dataset bench --out results/dataset`. Processor: {}. World: `{}`.\n\n## The whole way to disk\n\n\
+        "# Making data sets\n\nMade by `wayhome dataset bench --out results/dataset` with wayhome {}. Processor: {}. World: `{}`.\n\n## The whole way to disk\n\n\
          Colours, range and instances as PNG, truth, sums; CPU renderer; random poses; medians of rounds of {} panoramas that take \
          turns. Panoramas a second:\n\n\
          | size | layout | threads | rendering alone | encoding alone | the whole | of the slower alone | most that is possible | \
          rendering, one thread | encoding, one thread | the whole of the slower of these |\n|---|---|---|---|---|---|---|---|---|---|---|\n",
+        crate::VERSION,
         f.processor,
         f.world,
         f.rates.first().map_or(0, |r| r.frames)

@@ -295,7 +295,7 @@ pub fn bound(
         odometry_share: settings.odometry_share,
         world: world.spec.name.clone(),
         world_sha256: world.sha256.clone(),
-        version: env!("CARGO_PKG_VERSION"),
+        version: crate::VERSION,
     })
 }
 

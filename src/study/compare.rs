@@ -207,7 +207,7 @@ pub fn compare(
     Ok(Comparison {
         world: world.spec.name.clone(),
         world_sha256: world.sha256.clone(),
-        version: env!("CARGO_PKG_VERSION"),
+        version: crate::VERSION,
         seeds: [*seeds.start(), *seeds.end()],
         grid_spacing_m,
         grid_heading_rad: heading,

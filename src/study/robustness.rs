@@ -189,7 +189,7 @@ pub fn run(
         renderer,
         world: world.spec.name.clone(),
         world_sha256: world.sha256.clone(),
-        version: env!("CARGO_PKG_VERSION"),
+        version: crate::VERSION,
     })
 }
 

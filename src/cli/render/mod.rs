@@ -97,7 +97,7 @@ impl<'a> Meta<'a> {
             renderer,
             world: &world.spec.name,
             world_sha256: &world.sha256,
-            version: env!("CARGO_PKG_VERSION"),
+            version: wayhome::VERSION,
         }
     }
 }

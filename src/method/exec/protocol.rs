@@ -66,7 +66,7 @@ impl<'a> Hello<'a> {
         Self {
             kind: "hello",
             protocol: PROTOCOL,
-            version: env!("CARGO_PKG_VERSION"),
+            version: crate::VERSION,
             robot: Robot {
                 track_m: robot.track_m,
                 camera_offset_m: robot.camera_offset_m,

@@ -118,7 +118,7 @@ fn page(before: &str, sections: &[Section]) -> String {
     for target in Target::VARIANTS {
         let [begin, end] = ["begin", "end"].map(|edge| format!("<!-- {edge} {} -->\n", target.name()));
         let body = match sections.iter().find(|s| s.target == *target) {
-            Some(section) => section.markdown.as_str(),
+            Some(section) => &format!("{}\nMade with wayhome {}.\n", section.markdown, crate::VERSION),
             None => match before.split_once(&begin).and_then(|(_, rest)| rest.split_once(&end)) {
                 Some((body, _)) => body,
                 None => continue,

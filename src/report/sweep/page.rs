@@ -257,7 +257,7 @@ impl Page<'_> {
         let mut rows: Vec<(&str, String)> = vec![
             ("study", format!("<code>{}</code>", self.sha256)),
             ("world", format!("{}, <code>{}</code>", escaped(&study.world), study.world_sha256)),
-            ("version", format!("wayhome {}", env!("CARGO_PKG_VERSION"))),
+            ("version", format!("wayhome {}", crate::VERSION)),
             ("seeds", format!("{} to {}", study.seeds.start(), study.seeds.end())),
             (
                 "design",

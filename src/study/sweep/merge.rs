@@ -21,7 +21,7 @@ impl Identity {
     /// That of rows which this program makes.
     #[must_use]
     pub fn of(study: &Study) -> Self {
-        Self { study: study.name.clone(), sha256: study.sha256(), version: env!("CARGO_PKG_VERSION").to_owned() }
+        Self { study: study.name.clone(), sha256: study.sha256(), version: crate::VERSION.to_owned() }
     }
 
     /// As notes of a file.

@@ -160,7 +160,7 @@ impl Study {
     #[must_use]
     pub fn sha256(&self) -> String {
         let text = serde_json::to_string(self).unwrap_or_default();
-        let hash = Sha256::digest(format!("wayhome {}\n{text}", env!("CARGO_PKG_VERSION")));
+        let hash = Sha256::digest(format!("wayhome {}\n{text}", crate::VERSION));
         hash.iter().map(|b| format!("{b:02x}")).collect()
     }
 

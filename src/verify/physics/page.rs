@@ -255,12 +255,14 @@ fn percent(share: f64) -> String {
 }
 
 fn page(findings: &Findings, outside: Option<&OutsideDrives>, speed: Option<&Speed>) -> String {
-    let mut text = "# The physics against its closed forms\n\n\
-        Made by `wayhome physics-report --out results/physics`. Lines are equations, points are the plant of the program at its\n\
-        substep of 1 ms. The same equations are tests in `tests/physics.rs` and `tests/physics_settings.rs`. Robot: an iRobot\n\
-        Create 3 with equal wheels and, where the equation asks for it, its weight on the two wheels alone.\n\n\
-        | what | equation | greatest difference | allowed by the tests |\n|---|---|---|---|\n"
-        .to_owned();
+    let mut text = format!(
+        "# The physics against its closed forms\n\n\
+        Made by `wayhome physics-report --out results/physics` with wayhome {}. Lines are equations, points are the plant of the\n\
+        program at its substep of 1 ms. The same equations are tests in `tests/physics.rs` and `tests/physics_settings.rs`. Robot:\n\
+        an iRobot Create 3 with equal wheels and, where the equation asks for it, its weight on the two wheels alone.\n\n\
+        | what | equation | greatest difference | allowed by the tests |\n|---|---|---|---|\n",
+        crate::VERSION
+    );
     for form in &findings.closed_forms {
         let _ = writeln!(
             text,

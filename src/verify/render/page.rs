@@ -82,15 +82,17 @@ pub fn line(speed: &Speed) -> String {
 }
 
 fn page(findings: &Findings) -> String {
-    let mut text = "# The renderer\n\n\
-        Made by `wayhome render-report --out results/rendering`.\n\n\
+    let mut text = format!(
+        "# The renderer\n\n\
+        Made by `wayhome render-report --out results/rendering` with wayhome {}.\n\n\
         ## Speed\n\n\
         A round hall of 40 textured walls with 20 discs, floor and ceiling; colours, range and instance of every pixel; prefiltered\n\
         textures, no noise. Four bytes of colour a pixel are counted, six of range and instance come on top. The limit is to fill\n\
         256 MiB with one thread by the system's memset; it is timed again between any two of the runs whose median is shown. On\n\
         processors with large caches that is not all they can do: stores past the caches may be twice as fast.\n\
-        `wayhome render --bench` prints the table of the machine at hand.\n\n"
-        .to_owned();
+        `wayhome render --bench` prints the table of the machine at hand.\n\n",
+        crate::VERSION
+    );
     let _ = writeln!(text, "Processor: {}.", findings.processor);
     if let Some(gpu) = &findings.gpu {
         let _ = writeln!(text, "Graphics adapter: {}, {}.", gpu.adapter, gpu.driver);

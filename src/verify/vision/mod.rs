@@ -150,7 +150,7 @@ pub fn run(
         size_px: worlds.first().map_or([0, 0], |w| [w.projection().width, w.projection().height]),
         seed: settings.seed,
         observe_ms: 0.0,
-        version: env!("CARGO_PKG_VERSION"),
+        version: crate::VERSION,
     };
     let mut times_ms = Vec::new();
     for world in worlds {
