@@ -3,6 +3,8 @@
 //! A condition is written as changes joined by `+`: `night+cheap`, `moved:2+exposure:1.5`. `original` changes nothing.
 
 use rand_pcg::rand_core::Rng;
+use serde::Deserialize;
+use serde::de::value::{BorrowedStrDeserializer, Error as ValueError};
 
 use crate::error::{Error, Result};
 use crate::geometry::Vector2;
@@ -81,33 +83,30 @@ fn change(word: &str) -> std::result::Result<Change, String> {
         let read = found.parse().ok().filter(|x: &f64| (least..=most).contains(x));
         read.ok_or_else(|| format!("{name}: found `{found}`, allowed is a number from {least} to {most}"))
     };
-    let count = |usual: u64| match value {
-        None => Ok(usual),
-        Some(text) => text.parse::<u64>().map_err(|_| format!("{name}: found `{text}`, allowed is a whole number")),
+    let count = |usual: u64| {
+        let read = value.map_or(Ok(usual), str::parse);
+        read.map_err(|_| format!("{name}: found `{}`, allowed is a whole number", value.unwrap_or_default()))
     };
-    let plain = |change| match value {
-        None => Ok(change),
-        Some(text) => Err(format!("{name} takes no value, found `{text}`")),
-    };
-    match name {
-        "day" => plain(Change::Light(LightPreset::Day)),
-        "overcast" => plain(Change::Light(LightPreset::Overcast)),
-        "glare" => plain(Change::Light(LightPreset::Glare)),
-        "evening" => plain(Change::Light(LightPreset::Evening)),
-        "night" => plain(Change::Light(LightPreset::Night)),
-        "winlit" => Ok(Change::WindowLit(count(0)? as usize)),
-        "ideal" => plain(Change::Camera(CameraPreset::Ideal)),
-        "decent" => plain(Change::Camera(CameraPreset::Decent)),
-        "cheap" => plain(Change::Camera(CameraPreset::Cheap)),
-        "dirty" => plain(Change::Camera(CameraPreset::Dirty)),
-        "night-camera" => plain(Change::Camera(CameraPreset::Night)),
-        "exposure" => Ok(Change::Exposure(number(0.01, 100.0)?)),
-        "blur" => Ok(Change::BlurDeg(number(0.0, 5.0)?)),
-        "noise" => Ok(Change::Noise(number(50.0, 1e6)?)),
-        "moved" => Ok(Change::Moved(count(1)?)),
-        "textures" => Ok(Change::Textures(count(1)?)),
-        _ => Err(format!("found `{word}`, allowed is {CHANGES}")),
-    }
+    Ok(match name {
+        "winlit" => Change::WindowLit(count(0)? as usize),
+        "exposure" => Change::Exposure(number(0.01, 100.0)?),
+        "blur" => Change::BlurDeg(number(0.0, 5.0)?),
+        "noise" => Change::Noise(number(50.0, 1e6)?),
+        "moved" => Change::Moved(count(1)?),
+        "textures" => Change::Textures(count(1)?),
+        _ => {
+            // Night is a light and a camera.
+            let camera = || preset(if name == "night-camera" { "night" } else { name });
+            let found = preset(name).map(Change::Light).or_else(|| camera().map(Change::Camera));
+            let found = found.ok_or_else(|| format!("found `{word}`, allowed is {CHANGES}"))?;
+            value.map_or(Ok(found), |text| Err(format!("{name} takes no value, found `{text}`")))?
+        }
+    })
+}
+
+/// The preset that files call so.
+fn preset<'de, T: Deserialize<'de>>(name: &'de str) -> Option<T> {
+    T::deserialize(BorrowedStrDeserializer::<ValueError>::new(name)).ok()
 }
 
 impl Condition {
@@ -126,19 +125,7 @@ impl Condition {
     /// Name for folders and keys: letters, digits, `-` and `_`.
     #[must_use]
     pub fn name(&self) -> String {
-        self.given
-            .chars()
-            .filter(|c| *c != ':')
-            .map(|c| {
-                if c == '+' {
-                    '-'
-                } else if c == '.' {
-                    '_'
-                } else {
-                    c
-                }
-            })
-            .collect()
+        self.given.replace('+', "-").replace('.', "_").replace(':', "")
     }
 
     /// The world under this condition. `seed` is that of the set.
