@@ -4,6 +4,8 @@
 //! plain (no compression, one row group, no time stamp), so that the same table is the same bytes everywhere and any reader
 //! opens it.
 
+mod rows;
+
 use std::sync::Arc;
 
 use parquet::basic::{ConvertedType, Repetition, Type as Physical};
@@ -15,6 +17,8 @@ use parquet::file::reader::{FileReader, SerializedFileReader};
 use parquet::file::writer::{SerializedColumnWriter, SerializedFileWriter};
 use parquet::record::Field;
 use parquet::schema::types::Type;
+
+pub(crate) use rows::{Row, Rows};
 
 /// The cells of one column, top to bottom; `None` is an empty cell.
 #[derive(Debug, Clone, PartialEq)]

@@ -17,7 +17,7 @@ use wayhome::episode::{PlantKind, SensorKind, Setup, Simulation, Start};
 use wayhome::geometry::{Pose, wrap};
 use wayhome::method::MethodKind;
 use wayhome::panorama::Panorama;
-use wayhome::panorama_set::{Layout, PanoramaSet, Place};
+use wayhome::panorama_set::{LayoutKind, PanoramaSet, Place};
 use wayhome::render::{CpuRenderer, Renderer, Scene, View};
 use wayhome::report::dataset::card;
 use wayhome::sensor::DatasetChoice;
@@ -27,7 +27,7 @@ use wayhome::world::World;
 /// Width of the small panoramas here.
 const SIZE: (u32, u32) = (180, 24);
 
-fn request(layout: Layout) -> Request {
+fn request(layout: LayoutKind) -> Request {
     Request {
         places: Places::Grid { columns: 5, rows: 4, spacing_m: 0.9, origin_m: None },
         headings: Headings::Own,
@@ -78,7 +78,7 @@ fn faults(folder: &Path) -> Vec<(String, FaultKind)> {
 #[test]
 fn every_layout_is_read_back_equal() {
     let world = World::open("lab").unwrap();
-    for layout in Layout::WRITTEN {
+    for layout in LayoutKind::written() {
         let folder = tempfile::tempdir().unwrap();
         let plan = Plan::new(&world, request(layout)).unwrap();
         assert!(make(&plan, folder.path(), (1, 1)).unwrap().complete);
@@ -105,7 +105,7 @@ fn every_layout_is_read_back_equal() {
                 for (a, b) in got.rgba.chunks_exact(4).zip(wanted.rgba.chunks_exact(4)) {
                     let weights = [0.299, 0.587, 0.114];
                     let luma = b.iter().zip(weights).map(|(c, w)| f64::from(*c) * w).sum::<f64>();
-                    if layout.is_grey() {
+                    if layout.layout().is_grey() {
                         assert!((f64::from(a[0]) - luma).abs() <= 0.5 + 1e-9 && a[0] == a[1] && a[1] == a[2]);
                     } else {
                         assert_eq!(a[..3], b[..3]);
@@ -121,7 +121,7 @@ fn every_layout_is_read_back_equal() {
         assert_eq!(entries, set.entries().len());
         assert_eq!(set.clone().only("original").unwrap().at(Place { i: 0, j: 9 }).map(|_| ()).map_err(|_| ()), Err(()));
         // A condition by itself is a set, too.
-        if matches!(layout, Layout::Vardy | Layout::Folder | Layout::ImageDatabase) {
+        if matches!(layout, LayoutKind::Vardy | LayoutKind::Folder | LayoutKind::ImageDatabase) {
             let alone = PanoramaSet::open(&folder.path().join("original")).unwrap();
             assert_eq!((alone.layout(), alone.load(0).unwrap().rgba), (layout, set.load(0).unwrap().rgba));
         }
@@ -131,7 +131,7 @@ fn every_layout_is_read_back_equal() {
 #[test]
 fn shards_together_are_the_same_set() {
     let world = World::open("lab").unwrap();
-    for layout in [Layout::Webdataset, Layout::Folder] {
+    for layout in [LayoutKind::Webdataset, LayoutKind::Folder] {
         let places = Places::Random(150);
         let request = Request { places, headings: Headings::Random(1), size_px: Some((64, 8)), ..request(layout) };
         let plan = Plan::new(&world, request).unwrap();
@@ -158,7 +158,7 @@ fn shards_together_are_the_same_set() {
 #[test]
 fn a_full_stop_and_damage_are_mended() {
     let world = World::open("lab").unwrap();
-    let request = Request { places: Places::Random(200), headings: Headings::Random(1), ..request(Layout::Folder) };
+    let request = Request { places: Places::Random(200), headings: Headings::Random(1), ..request(LayoutKind::Folder) };
     let plan = Plan::new(&world, Request { size_px: Some((64, 8)), ..request }).unwrap();
     let base = tempfile::tempdir().unwrap();
     let (whole, broken) = (base.path().join("whole"), base.path().join("broken"));
@@ -333,7 +333,7 @@ fn real_sets_have_their_ways() {
     assert!(error.contains("none of place (1, 0)"), "{error}");
     pgm(&vardy, "2_1.pgm", 8, 3);
     let set = PanoramaSet::open(&vardy).unwrap().whole().unwrap();
-    assert_eq!((set.layout(), set.shape()), (Layout::Vardy, (2, 2)));
+    assert_eq!((set.layout(), set.shape()), (LayoutKind::Vardy, (2, 2)));
     let seen = set.at(Place { i: 0, j: 1 }).unwrap();
     assert_eq!((red(&seen, 0, 1), red(&seen, 1, 1), red(&seen, 7, 1)), (10, 17, 11), "column 0 stays, the others turn round");
     assert!(seen.range_m.is_empty() && seen.instance.is_empty());
@@ -409,7 +409,7 @@ fn a_set_leads_home() {
     let folder = tempfile::tempdir().unwrap();
     let places = Places::Grid { columns: 13, rows: 11, spacing_m: 0.3, origin_m: None };
     let conditions = vec![Condition::original()];
-    let request = Request { places, conditions, size_px: Some((720, 90)), ..request(Layout::Vardy) };
+    let request = Request { places, conditions, size_px: Some((720, 90)), ..request(LayoutKind::Vardy) };
     let plan = Plan::new(&world, request).unwrap();
     make(&plan, folder.path(), (1, 1)).unwrap();
     let document = PanoramaSet::open(folder.path()).unwrap().document().cloned().unwrap();
@@ -472,7 +472,7 @@ fn outside_readers_agree() {
     let Some(python) = python() else { return };
     let world = World::open("lab").unwrap();
     let folder = tempfile::tempdir().unwrap();
-    let plan = Plan::new(&world, request(Layout::Webdataset)).unwrap();
+    let plan = Plan::new(&world, request(LayoutKind::Webdataset)).unwrap();
     make(&plan, folder.path(), (1, 1)).unwrap();
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/outside/dataset_readers.py");
     let output = Command::new(python).arg(script).arg(folder.path()).output().unwrap();

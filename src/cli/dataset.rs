@@ -7,12 +7,14 @@ use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
 use anyhow::{Result, bail};
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use serde::Serialize;
+use strum::EnumMessage;
 use wayhome::dataset::check::{Inspection, check};
 use wayhome::dataset::conditions::{CHANGES, Condition};
 use wayhome::dataset::pipeline::Job;
 use wayhome::dataset::plan::{Headings, Places, Plan, Request};
-use wayhome::panorama_set::{Layout, Place};
+use wayhome::panorama_set::{LayoutKind, Place};
 use wayhome::render::{self, RendererChoice};
 use wayhome::report::dataset as report;
 use wayhome::sensor::DatasetChoice;
@@ -21,7 +23,7 @@ use wayhome::verify::dataset as speed;
 use wayhome::world::World;
 
 use super::Verdict;
-use super::args::{Choice, RENDERERS, choice, number, positive, quoted, size};
+use super::args::{RENDERERS, choice, number, positive, quoted, size};
 use super::context::{Context, default_folder};
 
 /// Shown under `dataset --help`.
@@ -35,13 +37,14 @@ Exit codes:
   2    usage: an argument or one of its values is not allowed
   130  interrupted by Ctrl-C; what is there is whole";
 
-const LAYOUTS: &[Choice<Layout>] = &[
-    (Layout::Folder, "folder", "A folder a condition; colours, range, instances and truth of each frame"),
-    (Layout::Vardy, "vardy", "Vardy's panoramic image database: CONDITION/I_J.pgm, grey, clockwise"),
-    (Layout::Moeller, "moeller", "Moeller's: a .db line and cv_X_Y_bwBW.pgm, grey, clockwise"),
-    (Layout::ImageDatabase, "image-database", "BrainsOnBoard: database_entries.csv, database_metadata.yaml, PNG"),
-    (Layout::Webdataset, "webdataset", "Tar shards for training"),
-];
+/// The layouts that are written, with the first lines of their docs as help.
+fn layouts() -> impl TypedValueParser<Value = LayoutKind> {
+    let names = LayoutKind::written().map(|kind| {
+        let about = kind.get_documentation().and_then(|text| text.lines().next()).unwrap_or_default();
+        PossibleValue::new(kind.name()).help(about.trim_end_matches('.'))
+    });
+    PossibleValuesParser::new(names).try_map(|name| name.parse::<LayoutKind>())
+}
 
 /// Arguments of `dataset`.
 #[derive(Debug, clap::Args)]
@@ -80,8 +83,8 @@ pub struct DatasetArgs {
     #[arg(long, value_name = "CONDITION,…", value_delimiter = ',', long_help = conditions_help())]
     pub conditions: Vec<Condition>,
     /// How files are named and coded
-    #[arg(long, default_value = "folder", value_parser = choice(LAYOUTS))]
-    pub layout: Layout,
+    #[arg(long, default_value = "folder", value_parser = layouts())]
+    pub layout: LayoutKind,
     /// Columns and rows of the panorama, 16x8 to 16384x4096 [default: the world's]
     #[arg(long, value_name = "WxH", value_parser = size)]
     pub size: Option<(u32, u32)>,
@@ -215,7 +218,7 @@ struct Output {
     left_out: usize,
     parts: usize,
     complete: bool,
-    layout: Layout,
+    layout: LayoutKind,
     renderer: render::RendererInfo,
     out: String,
 }

@@ -1,7 +1,6 @@
 //! Is a set on disk what was written?
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::fs;
 use std::ops::ControlFlow;
 use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -9,10 +8,10 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::parts::{SUMS, card_record_name, read_record, record_name};
+use super::parts::{SUMS, if_there, read_record, record_names, walk};
 use crate::error::{Error, Result};
 use crate::panorama_set::{DOCUMENT, Document};
-use crate::storage::{io_error, sha256_of_file};
+use crate::storage::{io_error, open_within, read_within, sha256_of_file};
 
 /// What can be wrong with a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
@@ -50,10 +49,17 @@ pub struct Inspection {
     pub faults: Vec<SetFault>,
 }
 
+/// What is known of a file that should be there.
+#[derive(Default)]
+struct Expected {
+    sha256: Option<String>,
+    bytes: Option<u64>,
+}
+
 /// Reads all of a set and holds it against its sums. `watch` is told the files looked at and all of them, from any thread.
 ///
 /// # Errors
-/// When the folder holds no set, cannot be read, or `watch` breaks.
+/// When the folder holds no set, cannot be read, tells of files that are not plain ones in it, or `watch` breaks.
 pub fn check(folder: &Path, watch: &(dyn Fn(u64, u64) -> ControlFlow<()> + Sync)) -> Result<Inspection> {
     let Some(document) = Document::load(folder)? else {
         let message = format!("found no `{DOCUMENT}`, expected the folder of a set that `wayhome dataset` wrote");
@@ -61,20 +67,18 @@ pub fn check(folder: &Path, watch: &(dyn Fn(u64, u64) -> ControlFlow<()> + Sync)
     };
     let mut faults = BTreeSet::new();
     let mut fault = |path: &str, kind| faults.insert(SetFault { path: path.to_owned(), kind });
-    let mut expected: BTreeMap<String, (Option<String>, Option<u64>)> = BTreeMap::new();
+    let mut expected = BTreeMap::from([(DOCUMENT.to_owned(), Expected::default())]);
     let sums = read_sums(folder)?;
     let complete = sums.is_some();
-    for (path, sha256) in sums.unwrap_or_default() {
-        expected.insert(path, (Some(sha256), None));
-    }
-    for name in (0..document.parts).map(record_name).chain([card_record_name()]) {
+    expected.extend(sums.unwrap_or_default());
+    for name in record_names(&document) {
         match read_record(folder, &name) {
             Ok(Some(record)) => {
                 for file in record.files {
-                    let entry = expected.entry(file.path).or_insert((Some(file.sha256), None));
-                    entry.1 = Some(file.bytes);
+                    let entry = expected.entry(file.path).or_insert(Expected { sha256: Some(file.sha256), bytes: None });
+                    entry.bytes = Some(file.bytes);
                 }
-                expected.entry(name).or_insert((None, None));
+                expected.entry(name).or_default();
             }
             Ok(None) if complete => {}
             Ok(None) => {
@@ -82,35 +86,32 @@ pub fn check(folder: &Path, watch: &(dyn Fn(u64, u64) -> ControlFlow<()> + Sync)
             }
             Err(_) => {
                 fault(&name, FaultKind::Altered);
-                expected.entry(name).or_insert((None, None));
+                expected.entry(name).or_default();
             }
         }
     }
-    expected.entry(DOCUMENT.to_owned()).or_insert((None, None));
-    if !complete && faults.is_empty() {
+    if complete {
+        // In a set that is not finished, files of parts that are under way are no fault.
+        for path in walk(folder)?.iter().filter(|path| !expected.contains_key(*path) && *path != SUMS) {
+            fault(path, FaultKind::Extra);
+        }
+    } else if faults.is_empty() {
         faults.insert(SetFault { path: SUMS.to_owned(), kind: FaultKind::Missing });
     }
-    // In a set that is not finished, files of parts that are under way are no fault.
-    for path in if complete { walk(folder)? } else { Vec::new() } {
-        if !expected.contains_key(&path) && path != SUMS {
-            faults.insert(SetFault { path, kind: FaultKind::Extra });
-        }
-    }
     let (looked, read, total) = (AtomicU64::new(0), AtomicU64::new(0), expected.len() as u64);
-    let inspect = |(path, (sha256, bytes)): (&String, &(Option<String>, Option<u64>))| -> Result<Option<SetFault>> {
+    let inspect = |(path, expected): (&String, &Expected)| -> Result<Option<SetFault>> {
         if watch(looked.fetch_add(1, Ordering::Relaxed), total).is_break() {
             return Err(Error::Interrupted);
         }
-        let kind = match sha256_of_file(&folder.join(path)) {
-            Err(e) if e.kind() == std::io::ErrorKind::NotFound => Some(FaultKind::Missing),
-            Err(e) => return Err(io_error("read", &folder.join(path))(e)),
-            Ok((found, length)) => {
+        let full = folder.join(path);
+        let kind = match if_there(open_within(folder, &full))? {
+            None => Some(FaultKind::Missing),
+            Some((file, length)) => {
+                let found = sha256_of_file(file).map_err(io_error("read", &full))?.0;
                 read.fetch_add(length, Ordering::Relaxed);
-                match sha256 {
-                    Some(wanted) if *wanted != found && bytes.is_some_and(|b| length < b) => Some(FaultKind::Cut),
-                    Some(wanted) if *wanted != found => Some(FaultKind::Altered),
-                    _ => None,
-                }
+                let altered = expected.sha256.as_ref().is_some_and(|wanted| *wanted != found);
+                let cut = expected.bytes.is_some_and(|bytes| length < bytes);
+                altered.then_some(if cut { FaultKind::Cut } else { FaultKind::Altered })
             }
         };
         Ok(kind.map(|kind| SetFault { path: path.clone(), kind }))
@@ -121,38 +122,15 @@ pub fn check(folder: &Path, watch: &(dyn Fn(u64, u64) -> ControlFlow<()> + Sync)
 }
 
 /// Paths and sums of `SHA256SUMS`; `None` where there is none.
-fn read_sums(folder: &Path) -> Result<Option<Vec<(String, String)>>> {
+fn read_sums(folder: &Path) -> Result<Option<Vec<(String, Expected)>>> {
     let path = folder.join(SUMS);
-    let text = match fs::read_to_string(&path) {
-        Ok(text) => text,
-        Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(None),
-        Err(e) => return Err(io_error("read", &path)(e)),
-    };
+    let Some(bytes) = if_there(read_within(folder, &path))? else { return Ok(None) };
     let line = |(k, line): (usize, &str)| {
         let (sha256, name) = line.split_once("  ").filter(|(sum, _)| sum.len() == 64).ok_or_else(|| Error::Parse {
             path: path.clone(),
             message: format!("line {}: found `{line}`, expected a SHA-256 and a path", k + 1),
         })?;
-        Ok((name.to_owned(), sha256.to_owned()))
+        Ok((name.to_owned(), Expected { sha256: Some(sha256.to_owned()), bytes: None }))
     };
-    text.lines().enumerate().map(line).collect::<Result<_>>().map(Some)
-}
-
-/// Paths of all files of a folder and those below, with `/`, sorted.
-pub(super) fn walk(folder: &Path) -> Result<Vec<String>> {
-    let mut found = Vec::new();
-    let mut open = vec![(folder.to_owned(), String::new())];
-    while let Some((path, prefix)) = open.pop() {
-        for entry in fs::read_dir(&path).map_err(io_error("read folder", &path))? {
-            let entry = entry.map_err(io_error("read folder", &path))?;
-            let name = format!("{prefix}{}", entry.file_name().to_string_lossy());
-            if entry.file_type().map_err(io_error("read", &entry.path()))?.is_dir() {
-                open.push((entry.path(), format!("{name}/")));
-            } else {
-                found.push(name);
-            }
-        }
-    }
-    found.sort();
-    Ok(found)
+    String::from_utf8_lossy(&bytes).lines().enumerate().map(line).collect::<Result<_>>().map(Some)
 }

@@ -3,8 +3,10 @@
 use std::path::Path;
 
 use crate::error::{Error, Result};
-use crate::geometry::Pose;
+use crate::geometry::{Pose, Vector2};
 use crate::random::Seed;
+use crate::storage::io_error;
+use crate::table::{Row, Rows};
 use crate::world::World;
 
 /// A robot's pose at a time.
@@ -16,41 +18,48 @@ pub struct Frame {
     pub robot: Pose,
 }
 
-/// Reads a way from a table with a header: time, x, y and heading, in this order, as `t_s,x_m,y_m,heading_rad`,
-/// `t_s,x_m,y_m,heading_deg` or, in SI units, `t,x,y,heading`. Further columns are left alone, so that the `trajectory.csv` of a
-/// run is such a table.
+/// A point of a way as a table tells it.
+pub(super) struct Point {
+    /// Position in the room, m.
+    pub at: Vector2<f64>,
+    /// Heading, rad, where the table has one.
+    pub heading: Option<f64>,
+    time_s: Option<f64>,
+}
+
+/// Reads the points of a table with a header: `x_m`, `y_m`, and perhaps `heading_rad` or `heading_deg`, and `t_s`; in SI units also
+/// `x`, `y`, `heading` and `t`. Further columns are left alone. `needed` are those that must be there beside x and y.
 ///
 /// # Errors
-/// When the file cannot be read, the header is another one, a number is missing or not finite, or there is no row.
-pub fn load(path: &Path) -> Result<Vec<Frame>> {
-    let text = std::fs::read(path).map_err(|source| Error::Io { action: "read", path: path.to_owned(), source })?;
-    let fault = |message: String| Error::Parse { path: path.to_owned(), message };
-    let mut table = csv::ReaderBuilder::new().trim(csv::Trim::All).flexible(true).from_reader(text.as_slice());
-    let header: Vec<String> = table.headers().map_err(|e| fault(e.to_string()))?.iter().take(4).map(str::to_owned).collect();
-    let to_rad = match header.iter().map(String::as_str).collect::<Vec<_>>()[..] {
-        ["t_s", "x_m", "y_m", "heading_rad"] | ["t", "x", "y", "heading"] => 1.0,
-        ["t_s", "x_m", "y_m", "heading_deg"] => 1.0_f64.to_radians(),
-        _ => {
-            let found = header.join(",");
-            return Err(fault(format!("line 1: found `{found}`, expected a header that begins with t_s,x_m,y_m,heading_rad")));
-        }
+/// When the file cannot be read, a column is missing, a number is missing or not finite, or there is no row.
+pub(super) fn points(path: &Path, needed: &[&[&str]]) -> Result<Vec<Point>> {
+    let table = Rows::parse(&std::fs::read(path).map_err(io_error("read", path))?, path, "point")?;
+    let (x, y) = (table.needed(&["x_m", "x"])?, table.needed(&["y_m", "y"])?);
+    needed.iter().try_for_each(|names| table.needed(names).map(|_| ()))?;
+    let (time, radians) = (table.column(TIME), table.column(&["heading_rad", "heading"]));
+    let heading = radians.map(|k| (k, 1.0)).or(table.column(&["heading_deg"]).map(|k| (k, 1_f64.to_radians())));
+    let point = |row: Row<'_>| {
+        Ok(Point {
+            at: Vector2::new(row.number(x)?, row.number(y)?),
+            heading: heading.map(|(k, to_rad)| Ok::<_, Error>(row.number(k)? * to_rad)).transpose()?,
+            time_s: time.map(|k| row.number(k)).transpose()?,
+        })
     };
-    let mut frames = Vec::new();
-    for row in table.records() {
-        let row = row.map_err(|e| fault(e.to_string()))?;
-        let line = row.position().map_or(0, csv::Position::line);
-        let number = |k: usize| {
-            let cell = row.get(k).unwrap_or_default();
-            let found = cell.parse().ok().filter(|x: &f64| x.is_finite());
-            found.ok_or_else(|| fault(format!("line {line}, {}: found `{cell}`, expected a finite number", header[k])))
-        };
-        let robot = Pose::new(number(1)?, number(2)?, number(3)? * to_rad);
-        frames.push(Frame { time_s: number(0)?, robot });
-    }
-    if frames.is_empty() {
-        return Err(fault("found no row, expected one for each frame".to_owned()));
-    }
-    Ok(frames)
+    table.rows().map(point).collect()
+}
+
+/// Columns of time and of heading.
+const TIME: &[&str] = &["t_s", "t"];
+const HEADING: &[&str] = &["heading_rad", "heading_deg", "heading"];
+
+/// Reads a way from a table with time, x, y and heading, as `t_s,x_m,y_m,heading_rad`, `t_s,x_m,y_m,heading_deg` or, in SI units,
+/// `t,x,y,heading`. Further columns are left alone, so that the `trajectory.csv` of a run is such a table.
+///
+/// # Errors
+/// When the file cannot be read, a column is missing, a number is missing or not finite, or there is no row.
+pub fn load(path: &Path) -> Result<Vec<Frame>> {
+    let frame = |p: Point| Some(Frame { time_s: p.time_s?, robot: Pose::new(p.at.x, p.at.y, p.heading?) });
+    Ok(points(path, &[TIME, HEADING])?.into_iter().filter_map(frame).collect())
 }
 
 /// Poses that show a world: home, and places from which a run may start, drawn by `seed`.

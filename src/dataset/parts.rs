@@ -12,12 +12,12 @@ use serde::{Deserialize, Serialize};
 use super::plan::Part;
 use crate::error::{Error, Result};
 use crate::panorama_set::{DOCUMENT, Document};
-use crate::storage::{PARTIAL, io_error, sha256, write_atomically};
+use crate::storage::{self, PARTIAL, io_error, read_within, sha256, write_atomically};
 
 /// Folder of the records.
 const RECORDS: &str = "parts";
-/// Record of the files that belong to no part.
-pub(super) const CARD: &str = "set.json";
+/// Name of the record of the files that belong to no part.
+const REST: &str = "parts/set.json";
 /// Sums of all files, as `sha256sum --check` reads them.
 pub const SUMS: &str = "SHA256SUMS";
 
@@ -43,19 +43,21 @@ pub struct Record {
 #[derive(Debug)]
 pub struct SetFolder {
     path: PathBuf,
+    /// What the set is.
+    pub document: Document,
     lock: PathBuf,
     /// Held until the folder is given up; the system lets go of it however the process ends.
     _held: fs::File,
 }
 
 /// Name of a part's record.
-pub(super) fn record_name(part: usize) -> String {
+fn record_name(part: usize) -> String {
     format!("{RECORDS}/{part:06}.json")
 }
 
-/// Name of the record of all other files.
-pub(super) fn card_record_name() -> String {
-    format!("{RECORDS}/{CARD}")
+/// Names of all records of a set.
+pub(super) fn record_names(document: &Document) -> impl Iterator<Item = String> + use<> {
+    (0..document.parts).map(record_name).chain([REST.to_owned()])
 }
 
 impl SetFolder {
@@ -64,23 +66,16 @@ impl SetFolder {
     /// # Errors
     /// When it holds something else.
     pub fn check(path: &Path, document: &Document) -> Result<()> {
-        let refused = |found: String| Error::OutputTaken { path: path.to_owned(), found };
-        let held = match fs::read_dir(path) {
-            Ok(entries) => entries,
-            Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(()),
-            Err(e) => return Err(io_error("read folder", path)(e)),
-        };
-        let mut names = Vec::new();
-        for entry in held {
-            names.push(entry.map_err(io_error("read folder", path))?.file_name().to_string_lossy().into_owned());
+        let refused = |found: String| Err(Error::OutputTaken { path: path.to_owned(), found });
+        if !path.exists() {
+            return Ok(());
         }
-        names.sort();
-        let foreign = names.iter().find(|n| !n.ends_with(PARTIAL));
+        let foreign = storage::files(path)?.into_iter().find(|name| !name.ends_with(PARTIAL));
         match Document::load(path) {
-            Ok(None) => foreign.map_or(Ok(()), |name| Err(refused(format!("`{name}`")))),
+            Ok(None) => foreign.map_or(Ok(()), |name| refused(format!("`{name}`"))),
             Ok(Some(other)) if other == *document => Ok(()),
-            Ok(Some(other)) => Err(refused(format!("another set ({})", difference(&other, document)))),
-            Err(_) => Err(refused(format!("a `{DOCUMENT}` that is not of this program"))),
+            Ok(Some(other)) => refused(format!("another set ({})", difference(&other, document))),
+            Err(_) => refused(format!("a `{DOCUMENT}` that is not of this program")),
         }
     }
 
@@ -88,8 +83,8 @@ impl SetFolder {
     ///
     /// # Errors
     /// When it holds something else, another process writes the same shard, or it cannot be written.
-    pub fn claim(path: &Path, document: &Document, shard: (usize, usize)) -> Result<Self> {
-        Self::check(path, document)?;
+    pub fn claim(path: &Path, document: Document, shard: (usize, usize)) -> Result<Self> {
+        Self::check(path, &document)?;
         let records = path.join(RECORDS);
         fs::create_dir_all(&records).map_err(io_error("create folder", &records))?;
         let lock = records.join(format!(".lock-{}-of-{}", shard.0, shard.1));
@@ -98,21 +93,15 @@ impl SetFolder {
             return Err(Error::OutputTaken { path: path.to_owned(), found: "a set that another process is writing".into() });
         }
         if Document::load(path)?.is_none() {
-            write_atomically(&path.join(DOCUMENT), &document.to_json()?)?;
+            write_atomically(&path.join(DOCUMENT), storage::json(&document).as_bytes())?;
         }
-        Ok(Self { path: path.to_owned(), lock, _held: held })
-    }
-
-    /// Where it is.
-    #[must_use]
-    pub fn path(&self) -> &Path {
-        &self.path
+        Ok(Self { path: path.to_owned(), document, lock, _held: held })
     }
 
     /// Whether a part is done: its record is there, and so are the files that it names, in full length.
     #[must_use]
     pub fn is_done(&self, part: Part) -> bool {
-        is_whole(&self.path, &record_name(part.number))
+        is_whole(&self.path, part)
     }
 
     /// Writes a file, with the folders above it.
@@ -120,9 +109,16 @@ impl SetFolder {
     /// # Errors
     /// When it cannot be written.
     pub fn write(&self, name: &str, bytes: &[u8]) -> Result<FileRecord> {
-        let path = self.ready(name)?;
-        write_atomically(&path, bytes)?;
-        Ok(FileRecord { path: name.to_owned(), bytes: bytes.len() as u64, sha256: sha256(bytes) })
+        self.write_hashed(name.to_owned(), bytes, sha256(bytes))
+    }
+
+    /// The same for bytes whose SHA-256 is known.
+    ///
+    /// # Errors
+    /// As [`SetFolder::write`].
+    pub fn write_hashed(&self, path: String, bytes: &[u8], sha256: String) -> Result<FileRecord> {
+        write_atomically(&self.ready(&path)?, bytes)?;
+        Ok(FileRecord { path, bytes: bytes.len() as u64, sha256 })
     }
 
     /// The path of a file of the set; the folders above it are there.
@@ -141,33 +137,30 @@ impl SetFolder {
     ///
     /// # Errors
     /// When the record cannot be written.
-    pub fn commit(&self, name: &str, record: &Record) -> Result<()> {
-        self.write(name, &record_json(record)?).map(|_| ())
+    pub fn commit(&self, part: Part, record: &Record) -> Result<()> {
+        self.write(&record_name(part.number), storage::json(record).as_bytes()).map(|_| ())
     }
 
-    /// Writes the sums of all files and clears what interrupted runs left. All parts must be done.
+    /// Puts down the files that belong to no part, writes the sums of all files and clears what interrupted runs left. All parts
+    /// must be done.
     ///
     /// # Errors
     /// When a record cannot be read, or the sums cannot be written.
-    pub fn finish(&self, parts: usize) -> Result<()> {
+    pub fn finish(&self, rest: &Record) -> Result<()> {
+        self.write(REST, storage::json(rest).as_bytes())?;
         let mut sums = String::new();
-        let mut line = |sha256: &str, path: &str| {
-            use std::fmt::Write;
-            let _ = writeln!(sums, "{sha256}  {path}");
-        };
-        let names = (0..parts).map(record_name).chain([card_record_name()]);
-        for name in names {
+        let mut line = |sha256: &str, path: &str| sums.extend([sha256, "  ", path, "\n"]);
+        for name in record_names(&self.document) {
             let path = self.path.join(&name);
-            let bytes = fs::read(&path).map_err(io_error("read", &path))?;
+            let bytes = read_within(&self.path, &path)?;
             for file in parse_record(&bytes, &path)?.files {
                 line(&file.sha256, &file.path);
             }
             line(&sha256(&bytes), &name);
         }
-        let document = self.path.join(DOCUMENT);
-        line(&sha256(&fs::read(&document).map_err(io_error("read", &document))?), DOCUMENT);
+        line(&sha256(&read_within(&self.path, &self.path.join(DOCUMENT))?), DOCUMENT);
         write_atomically(&self.path.join(SUMS), sums.as_bytes())?;
-        for left in super::check::walk(&self.path)? {
+        for left in walk(&self.path)? {
             let name = left.rsplit('/').next().unwrap_or_default();
             if name.ends_with(PARTIAL) || (left.starts_with(RECORDS) && name.starts_with(".lock-")) {
                 // Best effort: the set is whole either way.
@@ -184,19 +177,25 @@ impl Drop for SetFolder {
     }
 }
 
-/// Whether a record is there, and so are the files that it names, in full length.
-pub(super) fn is_whole(folder: &Path, record: &str) -> bool {
+/// Whether a part's record is there, and so are the files that it names, in full length.
+pub(super) fn is_whole(folder: &Path, part: Part) -> bool {
     let there = |file: &FileRecord| fs::metadata(folder.join(&file.path)).is_ok_and(|m| m.is_file() && m.len() == file.bytes);
-    read_record(folder, record).is_ok_and(|r| r.is_some_and(|r| r.files.iter().all(there)))
+    read_record(folder, &record_name(part.number)).is_ok_and(|r| r.is_some_and(|r| r.files.iter().all(there)))
 }
 
 /// A record; `None` where there is none.
 pub(super) fn read_record(folder: &Path, name: &str) -> Result<Option<Record>> {
     let path = folder.join(name);
-    match fs::read(&path) {
-        Ok(bytes) => parse_record(&bytes, &path).map(Some),
-        Err(e) if e.kind() == std::io::ErrorKind::NotFound => Ok(None),
-        Err(e) => Err(io_error("read", &path)(e)),
+    let bytes = if_there(read_within(folder, &path))?;
+    bytes.map(|bytes| parse_record(&bytes, &path)).transpose()
+}
+
+/// `None` where a file is not there.
+pub(super) fn if_there<T>(read: Result<T>) -> Result<Option<T>> {
+    match read {
+        Ok(value) => Ok(Some(value)),
+        Err(Error::Io { source, .. }) if source.kind() == std::io::ErrorKind::NotFound => Ok(None),
+        Err(e) => Err(e),
     }
 }
 
@@ -204,11 +203,23 @@ fn parse_record(bytes: &[u8], path: &Path) -> Result<Record> {
     serde_json::from_slice(bytes).map_err(|e| Error::Parse { path: path.to_owned(), message: e.to_string() })
 }
 
-fn record_json(record: &Record) -> Result<Vec<u8>> {
-    let mut bytes =
-        serde_json::to_vec_pretty(record).map_err(|e| Error::Parse { path: RECORDS.into(), message: e.to_string() })?;
-    bytes.push(b'\n');
-    Ok(bytes)
+/// Paths of all files of a folder and those below, with `/`, sorted.
+pub(super) fn walk(folder: &Path) -> Result<Vec<String>> {
+    let mut found = Vec::new();
+    let mut open = vec![(folder.to_owned(), String::new())];
+    while let Some((path, prefix)) = open.pop() {
+        for entry in fs::read_dir(&path).map_err(io_error("read folder", &path))? {
+            let entry = entry.map_err(io_error("read folder", &path))?;
+            let name = format!("{prefix}{}", entry.file_name().to_string_lossy());
+            if entry.file_type().map_err(io_error("read", &entry.path()))?.is_dir() {
+                open.push((entry.path(), format!("{name}/")));
+            } else {
+                found.push(name);
+            }
+        }
+    }
+    found.sort();
+    Ok(found)
 }
 
 /// The first field in which two documents differ.

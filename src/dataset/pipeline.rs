@@ -7,22 +7,20 @@
 //! written, the truth of one part, and the scene and home panorama of one condition. Only the plan's poses grow with the set,
 //! some 50 bytes each.
 
-use std::io::Write;
 use std::ops::ControlFlow;
 use std::path::Path;
-use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+use std::sync::mpsc::{Receiver, sync_channel};
 
 use rayon::prelude::*;
 
-use super::parts::{FileRecord, Record, SetFolder, card_record_name, record_name};
+use super::parts::{FileRecord, Record, SetFolder, is_whole};
 use super::plan::{Part, Plan, Stage};
 use super::truth::{TrueMatch, Witness, json, tables};
 use crate::error::{Error, Result};
 use crate::geometry::Twist;
 use crate::panorama::Panorama;
 use crate::panorama_set::{
-    Document, Frame, FrameTruth, Layout, Names, Shard, database_line, database_name, encode_grey, encode_instance,
-    encode_range, encode_rgb, entries_csv, metadata_yaml, mirror, shard_name,
+    Document, Frame, FrameTruth, Layout, encode_grey, encode_instance, encode_range, encode_rgb, mirror,
 };
 use crate::random::Seed;
 use crate::render::{Camera, Renderer, Scene, View};
@@ -61,8 +59,8 @@ pub struct Outcome {
     pub complete: bool,
 }
 
-/// What goes with a set beside its frames: made of its document and the home panoramas, by name.
-pub type Extras<'a> = &'a (dyn Fn(&Document, &Panorama) -> Result<Vec<(String, Vec<u8>)>> + Sync);
+/// What goes with a set beside its frames: made of its layout, its document and the first condition's home panorama, by name.
+pub type Extras<'a> = &'a (dyn Fn(&dyn Layout, &Document, &Panorama) -> Result<Vec<(String, Vec<u8>)>> + Sync);
 
 /// A set in the making.
 pub struct Job<'a> {
@@ -72,7 +70,7 @@ pub struct Job<'a> {
     pub out: &'a Path,
     /// Which share of the parts this run makes: number, from 1, and count.
     pub shard: (usize, usize),
-    /// Files to add, made of the document and the first condition's home panorama.
+    /// Files to add.
     pub extras: Extras<'a>,
 }
 
@@ -99,44 +97,48 @@ impl Job<'_> {
         let document = plan.document(renderer.info());
         SetFolder::check(self.out, &document)?;
         let base = Scene::new(&plan.world)?;
-        let first = self.prepare(&plan.stages[0], &base, renderer)?;
-        let mine = |part: &&Part| part.number % self.shard.1 == self.shard.0 - 1;
-        let record_there = |part: &&Part| super::parts::is_whole(self.out, &record_name(part.number));
-        let missing: usize = plan.parts.iter().filter(mine).filter(|p| !record_there(p)).map(|p| p.count).sum();
-        self.check_room(first.witness.home(), missing)?;
-        let folder = SetFolder::claim(self.out, &document, self.shard)?;
-        let pending: Vec<Part> = plan.parts.iter().filter(mine).filter(|p| !folder.is_done(**p)).copied().collect();
-        let all: usize = plan.parts.iter().filter(mine).map(|p| p.count).sum();
-        let found = all - pending.iter().map(|p| p.count).sum::<usize>();
-        let mut progress = Progress { done: found, all };
+        let mut first = Some(self.prepare(&plan.stages[0], &base, renderer)?);
+        let mine: Vec<Part> = plan.parts.iter().filter(|p| p.number % self.shard.1 == self.shard.0 - 1).copied().collect();
+        let pending: Vec<Part> = mine.iter().filter(|p| !is_whole(self.out, **p)).copied().collect();
+        let frames = |parts: &[Part]| parts.iter().map(|p| p.count).sum::<usize>();
+        let (all, missing) = (frames(&mine), frames(&pending));
+        if let Some(set) = &first {
+            self.check_room(set.witness.home(), missing)?;
+        }
+        let folder = SetFolder::claim(self.out, document, self.shard)?;
+        let mut progress = Progress { done: all - missing, all };
         if watch(progress).is_break() {
             return Err(Error::Interrupted);
         }
-        let mut ready = Some(first);
-        let mut homes = Record::default();
+        let mut rest = Record::default();
         for (k, stage) in plan.stages.iter().enumerate() {
-            let set = match ready.take() {
-                Some(set) => set,
-                None => self.prepare(stage, &base, renderer)?,
-            };
-            homes.files.extend(write_home(&folder, stage, set.witness.home())?);
+            let set = first.take().map_or_else(|| self.prepare(stage, &base, renderer), Ok)?;
+            let home = set.witness.home();
+            let name = |channel: &str| format!("home/{}.{channel}.png", stage.staged.condition.name());
+            let (rgb, range, instance) = (name("rgb"), name("range"), name("instance"));
+            // Columns run anti-clockwise here in every layout.
+            let pictures = [encode_rgb(home, &rgb)?, encode_range(home, &range)?, encode_instance(home, &instance)?];
+            let mut beside: Vec<(String, Vec<u8>)> = [rgb, range, instance].into_iter().zip(pictures).collect();
             if k == 0 {
-                for (name, bytes) in (self.extras)(&document, set.witness.home())? {
-                    homes.files.push(folder.write(&name, &bytes)?);
-                }
+                beside.extend((self.extras)(plan.request().layout.layout(), &folder.document, home)?);
+            }
+            for (name, bytes) in beside {
+                rest.files.push(folder.write(&name, &bytes)?);
             }
             let parts: Vec<Part> = pending.iter().filter(|p| p.stage == k).copied().collect();
             for parts in parts.chunks(BATCH) {
-                self.make(&folder, &document, &set, parts, renderer, &mut progress, watch)?;
+                self.make(&folder, &set, parts, renderer, &mut progress, watch)?;
             }
         }
         let complete = plan.parts.iter().all(|part| folder.is_done(*part));
         if complete {
-            homes.files.extend(self.write_lists(&folder, &document)?);
-            folder.commit(&card_record_name(), &homes)?;
-            folder.finish(plan.parts.len())?;
+            let lists = plan.request().layout.layout().lists(&folder.document, &|stage| plan.stage_frames(stage).collect());
+            for (name, text) in std::iter::once(("left-out.csv".to_owned(), plan.left_out_csv())).chain(lists) {
+                rest.files.push(folder.write(&name, text.as_bytes())?);
+            }
+            folder.finish(&rest)?;
         }
-        Ok(Outcome { rendered: all - found, found, complete })
+        Ok(Outcome { rendered: missing, found: all - missing, complete })
     }
 
     /// Packs the scene of a condition and takes its home panorama.
@@ -175,11 +177,9 @@ impl Job<'_> {
     }
 
     /// Makes some parts of one condition.
-    #[allow(clippy::too_many_arguments, reason = "all of them are what a run is about")]
     fn make(
         &self,
         folder: &SetFolder,
-        document: &Document,
         set: &Set<'_>,
         parts: &[Part],
         renderer: &mut dyn Renderer,
@@ -191,29 +191,28 @@ impl Job<'_> {
         let bodies = plan.stages[parts[0].stage].staged.world.body_poses();
         let views: Vec<View<'_>> =
             frames.iter().map(|f| View { projection: plan.projection, robot: f.robot, bodies: &bodies }).collect();
-        let layout = plan.request().layout;
         let queue = (QUEUE_BYTES / (FILE_BYTES * plan.projection.pixels())).clamp(2, QUEUE);
         let (sender, receiver) = sync_channel::<Encoded>(queue);
-        let writer = Writer { folder, document, layout };
         std::thread::scope(|scope| {
-            let writing = scope.spawn(move || writer.write_parts(parts, &condition_names(plan, parts), &receiver));
+            let writing = scope.spawn(move || self.write_parts(folder, parts, &receiver));
             let rendered = renderer.render_batch(&set.scene, &views, &mut |first, panoramas| {
                 if watch(*progress).is_break() {
                     return Err(Error::Interrupted);
                 }
                 let numbered = panoramas.par_iter_mut().zip(&frames[first..]).with_max_len(1);
-                let noise = |frame: &Frame| self.noise(&format!("frame {}", frame.number));
                 let encoded: Vec<Encoded> = numbered
                     .map_init(
                         || set.camera.clone(),
                         |camera, (panorama, frame)| {
-                            camera.develop(panorama, noise(frame));
-                            encode(&set.witness, frame, layout.names(frame, document), layout, panorama)
+                            camera.develop(panorama, self.noise(&format!("frame {}", frame.number)));
+                            self.encode(&folder.document, &set.witness, frame, panorama)
                         },
                     )
                     .collect::<Result<_>>()?;
                 progress.done += panoramas.len();
-                send(&sender, encoded)
+                // The receiver is gone only when writing has failed, which the writing thread tells.
+                let send = |frame| sender.send(frame).map_err(|_| Error::Threads("the writing thread ended".into()));
+                encoded.into_iter().try_for_each(send)
             });
             drop(sender);
             let written = writing.join().unwrap_or_else(|_| Err(Error::Threads("the writing thread failed".into())));
@@ -227,127 +226,82 @@ impl Job<'_> {
         if watch(*progress).is_break() { Err(Error::Interrupted) } else { Ok(()) }
     }
 
-    /// Lists that a layout has beside its pictures, and that of the poses left out.
-    fn write_lists(&self, folder: &SetFolder, document: &Document) -> Result<Vec<FileRecord>> {
-        let mut files = vec![folder.write("left-out.csv", self.plan.left_out_csv().as_bytes())?];
-        match document.layout {
-            Layout::ImageDatabase => {
-                for (k, stage) in self.plan.stages.iter().enumerate() {
-                    let name = stage.staged.condition.name();
-                    if document.conditions[k].frames == 0 {
-                        continue;
-                    }
-                    let table = entries_csv(&self.plan.stage_frames(k).collect::<Vec<_>>(), document);
-                    let file = |file: &str| format!("{name}/{file}");
-                    files.push(folder.write(&file(crate::panorama_set::ENTRIES), table.as_bytes())?);
-                    files.push(folder.write(&file(crate::panorama_set::METADATA), metadata_yaml(document).as_bytes())?);
-                }
-            }
-            Layout::Moeller => files.push(folder.write(&database_name(document), database_line(document).as_bytes())?),
-            _ => {}
+    /// The files of a frame. The panorama is left with its columns as the layout has them.
+    fn encode(&self, set: &Document, witness: &Witness<'_>, frame: &Frame, panorama: &mut Panorama) -> Result<Encoded> {
+        let layout = self.plan.request().layout.layout();
+        let names = layout.names(frame, set);
+        let truth = witness.frame(frame, panorama);
+        let matches = witness.matches(frame, panorama);
+        if layout.is_clockwise() {
+            mirror(panorama);
         }
-        Ok(files)
+        let image = if layout.is_grey() { encode_grey(panorama) } else { encode_rgb(panorama, &names.image)? };
+        let range = encode_range(panorama, &names.range)?;
+        let instance = encode_instance(panorama, &names.instance)?;
+        let mut files = vec![(names.image, image), (names.range, range), (names.instance, instance)];
+        if let Some(name) = names.truth {
+            files.push((name, json(&truth)?));
+        }
+        // An archive is hashed as a whole while it is written.
+        let alone = layout.archive(&frame.condition, 0).is_none();
+        let hashed = |(name, bytes): (String, Vec<u8>)| {
+            let sum = if alone { sha256(&bytes) } else { String::new() };
+            (name, bytes, sum)
+        };
+        Ok(Encoded { files: files.into_iter().map(hashed).collect(), truth, matches })
     }
-}
 
-fn condition_names(plan: &Plan, parts: &[Part]) -> Vec<String> {
-    parts.iter().map(|p| plan.stages[p.stage].staged.condition.name()).collect()
-}
-
-fn send(sender: &SyncSender<Encoded>, frames: Vec<Encoded>) -> Result<()> {
-    // The receiver is gone only when writing has failed, which the writing thread tells.
-    let sent = |frame| sender.send(frame).map_err(|_| Error::Threads("the writing thread ended".into()));
-    frames.into_iter().try_for_each(sent)
+    /// Writes parts as their frames come in. Ends without a fault where frames stop coming; a part that was begun is then given up.
+    fn write_parts(&self, folder: &SetFolder, parts: &[Part], frames: &Receiver<Encoded>) -> Result<()> {
+        for part in parts {
+            let condition = self.plan.stages[part.stage].staged.condition.name();
+            let mut record = Record::default();
+            let mut held = Vec::with_capacity(part.count);
+            let mut archive = None;
+            if let Some(name) = self.plan.request().layout.layout().archive(&condition, part.number) {
+                let path = folder.ready(&name)?;
+                archive = Some((name, tar::Builder::new(GrowingFile::create(&path)?), path));
+            }
+            for _ in 0..part.count {
+                let Ok(frame) = frames.recv() else { return Ok(()) };
+                for (name, bytes, sum) in frame.files {
+                    match &mut archive {
+                        Some((_, tar, path)) => append(tar, &name, &bytes).map_err(io_error("write", path))?,
+                        None => record.files.push(folder.write_hashed(name, &bytes, sum)?),
+                    }
+                }
+                held.push((frame.truth, frame.matches));
+            }
+            if let Some((name, tar, path)) = archive {
+                let (sha256, bytes) = tar.into_inner().map_err(io_error("write", &path))?.complete()?;
+                record.files.push(FileRecord { path: name, bytes, sha256 });
+            }
+            let notes = [("command", folder.document.command.clone()), ("version", folder.document.version.clone())];
+            for (name, bytes) in tables(&held, &notes)? {
+                let (stem, ending) = name.split_once('.').unwrap_or((name, "bin"));
+                record.files.push(folder.write(&format!("truth/{stem}-{:06}.{ending}", part.number), &bytes)?);
+            }
+            folder.commit(*part, &record)?;
+        }
+        Ok(())
+    }
 }
 
 /// A frame that waits to be written.
 struct Encoded {
+    /// Name, bytes and SHA-256 of each file.
     files: Vec<(String, Vec<u8>, String)>,
     truth: FrameTruth,
     matches: Vec<TrueMatch>,
 }
 
-/// The files of a frame. The panorama is left with its columns as the layout has them.
-fn encode(witness: &Witness<'_>, frame: &Frame, names: Names, layout: Layout, panorama: &mut Panorama) -> Result<Encoded> {
-    let truth = witness.frame(frame, panorama);
-    let matches = witness.matches(frame, panorama);
-    if layout.is_clockwise() {
-        mirror(panorama);
-    }
-    let image = if layout.is_grey() { encode_grey(panorama) } else { encode_rgb(panorama, &names.image)? };
-    let range = encode_range(panorama, &names.range)?;
-    let instance = encode_instance(panorama, &names.instance)?;
-    let mut files = vec![(names.image, image), (names.range, range), (names.instance, instance)];
-    if let Some(name) = names.truth {
-        files.push((name, json(&truth)?));
-    }
-    // Archives are hashed as a whole while they are written.
-    let alone = layout != Layout::Webdataset;
-    let hashed = |(name, bytes): (String, Vec<u8>)| {
-        let sum = if alone { sha256(&bytes) } else { String::new() };
-        (name, bytes, sum)
-    };
-    Ok(Encoded { files: files.into_iter().map(hashed).collect(), truth, matches })
-}
-
-/// Writes a home panorama: colours, range and instances, columns anti-clockwise in every layout.
-fn write_home(folder: &SetFolder, stage: &Stage, home: &Panorama) -> Result<Vec<FileRecord>> {
-    let name = |channel: &str| format!("home/{}.{channel}.png", stage.staged.condition.name());
-    let (rgb, range, instance) = (name("rgb"), name("range"), name("instance"));
-    let bytes = [encode_rgb(home, &rgb)?, encode_range(home, &range)?, encode_instance(home, &instance)?];
-    [rgb, range, instance].iter().zip(bytes).map(|(name, bytes)| folder.write(name, &bytes)).collect()
-}
-
-/// What the writing thread knows.
-struct Writer<'a> {
-    folder: &'a SetFolder,
-    document: &'a Document,
-    layout: Layout,
-}
-
-impl Writer<'_> {
-    /// Writes parts as their frames come in. Ends without a fault where frames stop coming; a part that was begun is then given up.
-    fn write_parts(&self, parts: &[Part], conditions: &[String], frames: &Receiver<Encoded>) -> Result<()> {
-        for (part, condition) in parts.iter().zip(conditions) {
-            let mut record = Record::default();
-            let mut held = Vec::with_capacity(part.count);
-            let mut archive = None;
-            if self.layout == Layout::Webdataset {
-                let name = shard_name(condition, part.number);
-                archive = Some((name.clone(), Shard::new(GrowingFile::create(&self.folder.ready(&name)?)?)));
-            }
-            for _ in 0..part.count {
-                let Ok(frame) = frames.recv() else { return Ok(()) };
-                match &mut archive {
-                    Some((name, shard)) => {
-                        let broken = |e| io_error("write", &self.folder.path().join(&*name))(e);
-                        for (member, bytes, _) in &frame.files {
-                            shard.append(member, bytes).map_err(broken)?;
-                        }
-                    }
-                    None => {
-                        for (name, bytes, sha256) in frame.files {
-                            let path = self.folder.ready(&name)?;
-                            crate::storage::write_atomically(&path, &bytes)?;
-                            record.files.push(FileRecord { path: name, bytes: bytes.len() as u64, sha256 });
-                        }
-                    }
-                }
-                held.push((frame.truth, frame.matches));
-            }
-            if let Some((path, shard)) = archive {
-                let mut file = shard.into_inner().map_err(io_error("write", &self.folder.path().join(&path)))?;
-                file.flush().map_err(io_error("write", &self.folder.path().join(&path)))?;
-                let (sha256, bytes) = file.complete()?;
-                record.files.push(FileRecord { path, bytes, sha256 });
-            }
-            let notes = [("command", self.document.command.clone()), ("version", self.document.version.clone())];
-            for (name, bytes) in tables(&held, &notes)? {
-                let (stem, ending) = name.split_once('.').unwrap_or((name, "bin"));
-                record.files.push(self.folder.write(&format!("truth/{stem}-{:06}.{ending}", part.number), &bytes)?);
-            }
-            self.folder.commit(&record_name(part.number), &record)?;
-        }
-        Ok(())
-    }
+/// Appends a member without time or owner, so that the same frames are the same bytes.
+fn append(tar: &mut tar::Builder<GrowingFile>, name: &str, bytes: &[u8]) -> std::io::Result<()> {
+    let mut header = tar::Header::new_ustar();
+    header.set_size(bytes.len() as u64);
+    header.set_mode(0o644);
+    header.set_mtime(0);
+    header.set_path(name)?;
+    header.set_cksum();
+    tar.append(&header, bytes)
 }

@@ -10,17 +10,15 @@ use crate::dataset::film;
 use crate::error::{Error, Result};
 use crate::geometry::{Pose, Vector2, angle_of, wrap};
 use crate::panorama::Projection;
-use crate::panorama_set::{ConditionDocument, Document, Frame, GridDocument, Instance, Layout, Place};
+use crate::panorama_set::{ConditionDocument, Document, Frame, GridDocument, Instance, LayoutKind, MOST_PLACES, Place};
 use crate::random::{Seed, Stream};
 use crate::render::RendererInfo;
-use crate::storage::{io_error, sha256};
+use crate::storage::sha256;
 use crate::world::World;
 use crate::world::polygon::{bounds, contains_within};
 
 /// Most frames of a part. A part is the unit of work: it is whole or not there, and a shard takes whole parts.
 pub const PART_FRAMES: usize = 64;
-/// Most poses of a set.
-const MOST_SPOTS: usize = 10_000_000;
 /// Most beginnings of a grid that are tried along each axis.
 const MOST_BEGINS: usize = 40;
 /// Tries for each random place before the room is called too crowded.
@@ -73,7 +71,7 @@ pub struct Request {
     /// Columns and rows where they differ from the world's.
     pub size_px: Option<(u32, u32)>,
     /// How files are named.
-    pub layout: Layout,
+    pub layout: LayoutKind,
     /// Seed of all that is random.
     pub seed: u64,
     /// SPDX identifier.
@@ -138,7 +136,7 @@ impl Plan {
     pub fn new(world: &World, request: Request) -> Result<Self> {
         let (spots, grid) = spots(world, &request)?;
         check_layout(&request, grid.as_ref())?;
-        let projection = request.layout.projection(
+        let projection = request.layout.layout().projection(
             request.size_px.map_or_else(|| world.projection(), |(width, height)| world.projection_of_size(width, height)),
         );
         let mut names: Vec<String> = request.conditions.iter().map(Condition::name).collect();
@@ -241,7 +239,7 @@ impl Plan {
         });
         Document {
             format: "wayhome-dataset/1".into(),
-            layout: request.layout,
+            layout: request.layout.name().into(),
             command: request.command.clone(),
             version: crate::VERSION.into(),
             seed: request.seed,
@@ -254,7 +252,7 @@ impl Plan {
                 kind => format!("{kind}: {}, {}", renderer.adapter, renderer.driver),
             },
             projection: self.projection,
-            columns: if request.layout.is_clockwise() { "clockwise" } else { "anticlockwise" }.into(),
+            columns: if request.layout.layout().is_clockwise() { "clockwise" } else { "anticlockwise" }.into(),
             camera_height_m: world.spec.camera.height_m,
             range_unit: "mm; 65535 stands for all that is farther".into(),
             home: world.home.into(),
@@ -281,28 +279,20 @@ fn invalid(what: &str, found: impl Into<String>, allowed: impl Into<String>) -> 
 
 /// Refuses what a layout cannot hold.
 fn check_layout(request: &Request, grid: Option<&GridDocument>) -> Result<()> {
-    let one_heading =
-        matches!(&request.headings, Headings::Own) || matches!(&request.headings, Headings::Fixed(h) if h.len() == 1);
-    if request.layout == Layout::Paper {
-        return Err(invalid(
-            "--layout",
-            "paper",
-            "a layout that is written: vardy, moeller, image-database, webdataset, folder",
-        ));
+    let kind = request.layout;
+    if !kind.layout().is_written() {
+        let written: Vec<&str> = LayoutKind::written().map(LayoutKind::name).collect();
+        return Err(invalid("--layout", kind.name(), format!("a layout that is written: {}", written.join(", "))));
     }
-    if request.layout.needs_grid() && (grid.is_none() || !one_heading) {
-        let found = if grid.is_none() { "no --grid" } else { "several headings at a place" };
-        let allowed = "a grid with one heading for all: it holds one picture a place";
-        return Err(invalid(&format!("poses for layout {}", request.layout.name()), found, allowed));
+    let one_heading = match &request.headings {
+        Headings::Own => true,
+        Headings::Fixed(headings) => headings.len() == 1,
+        Headings::Random(_) => false,
+    };
+    match kind.layout().refuses(grid, one_heading) {
+        Some((found, allowed)) => Err(invalid(&format!("poses for layout {}", kind.name()), found, allowed)),
+        None => Ok(()),
     }
-    if request.layout == Layout::ImageDatabase && grid.is_some_and(|g| g.spacing_m < 0.001) {
-        return Err(invalid(
-            "--spacing-m",
-            grid.map_or(0.0, |g| g.spacing_m).to_string(),
-            "0.001 or more: names count millimetres",
-        ));
-    }
-    Ok(())
 }
 
 fn spots(world: &World, request: &Request) -> Result<(Vec<Spot>, Option<GridDocument>)> {
@@ -313,19 +303,15 @@ fn spots(world: &World, request: &Request) -> Result<(Vec<Spot>, Option<GridDocu
         Places::Grid { columns, rows, spacing_m, origin_m } => {
             let laid = lay_grid(world, (*columns, *rows), *spacing_m, *origin_m)?;
             // x fastest, from the least y up.
-            for i in (0..*rows).rev() {
-                for j in 0..*columns {
-                    let [x, y] = laid.first_m;
-                    let robot = Pose::new(x + j as f64 * spacing_m, y - i as f64 * spacing_m, world.home.heading);
-                    places.push(Spot { place: Some(Place { i, j }), robot, time_s: None });
-                }
-            }
+            let all = (0..*rows).rev().flat_map(|i| (0..*columns).map(move |j| Place { i, j }));
+            let spot = |place| Spot { place: Some(place), robot: laid.pose(place, world.home.heading), time_s: None };
+            places.extend(all.map(spot));
             grid = Some(laid);
         }
         Places::Route(path) => places = route(path)?,
         Places::Random(count) => {
-            if !(1..=MOST_SPOTS).contains(count) {
-                return Err(invalid("--random", count.to_string(), format!("1 to {MOST_SPOTS}")));
+            if !(1..=MOST_PLACES).contains(count) {
+                return Err(invalid("--random", count.to_string(), format!("1 to {MOST_PLACES}")));
             }
             own = false;
             places = random_places(world, *count, &mut seed.stream("dataset/places"))?;
@@ -341,9 +327,9 @@ fn spots(world: &World, request: &Request) -> Result<(Vec<Spot>, Option<GridDocu
         Headings::Fixed(headings) => headings.len(),
         Headings::Random(count) => *count,
     };
-    if !(1..=MOST_SPOTS).contains(&places.len().saturating_mul(each)) {
+    if !(1..=MOST_PLACES).contains(&places.len().saturating_mul(each)) {
         let found = format!("{} places with {each} headings", places.len());
-        return Err(invalid("poses of the set", found, format!("1 to {MOST_SPOTS} poses")));
+        return Err(invalid("poses of the set", found, format!("1 to {MOST_PLACES} poses")));
     }
     let mut turns = seed.stream("dataset/headings");
     let spots = places.into_iter().flat_map(|spot| {
@@ -393,109 +379,64 @@ fn lay_grid(
     if !(spacing_m > 0.0 && spacing_m.is_finite()) {
         return Err(invalid("--spacing-m", spacing_m.to_string(), "a length greater than 0"));
     }
-    if columns == 0 || rows == 0 || columns.saturating_mul(rows) > MOST_SPOTS {
-        return Err(invalid("--grid", format!("{columns}x{rows}"), format!("1 to {MOST_SPOTS} places")));
+    if columns == 0 || rows == 0 || columns.saturating_mul(rows) > MOST_PLACES {
+        return Err(invalid("--grid", format!("{columns}x{rows}"), format!("1 to {MOST_PLACES} places")));
     }
     let (low, high) = bounds(&world.outline);
     let size = |count: usize| (count - 1) as f64 * spacing_m;
-    let too_large = || {
+    // Place (i, j) of a grid whose least x and y are `lowest`.
+    let at = |lowest: Vector2<f64>, (i, j): (usize, usize)| lowest + Vector2::new(j as f64, (rows - 1 - i) as f64) * spacing_m;
+    let inside = |lowest: Vector2<f64>, place| contains_within(&world.outline, at(lowest, place), ON_PLACE_M);
+    let places = || (0..rows).flat_map(|i| (0..columns).map(move |j| (i, j)));
+    let rim = [(0, 0), (0, columns - 1), (rows - 1, 0), (rows - 1, columns - 1)];
+    let home = world.home.position();
+    // Where the grid may begin along an axis, and how far its middle then is from the room's: with home on a place, those nearest
+    // to the middle first; where it fits in no such way, about the middle.
+    let axis = |home: f64, low: f64, high: f64, count: usize| -> Vec<(f64, f64)> {
+        let centred = 0.5 * (low + high - size(count));
+        let fits = |begin: &f64| *begin >= low && begin + size(count) <= high;
+        let on_place = (0..count).map(|k| home - k as f64 * spacing_m).filter(fits);
+        let mut begins: Vec<(f64, f64)> = on_place.map(|b| ((b - centred).abs(), b)).collect();
+        begins.sort_by(|a, b| a.0.total_cmp(&b.0));
+        begins.truncate(MOST_BEGINS);
+        if begins.is_empty() && fits(&centred) {
+            begins.push((0.0, centred));
+        }
+        begins
+    };
+    let lowest = origin_m.map(Vector2::from).or_else(|| {
+        let (along_x, along_y) = (axis(home.x, low.x, high.x, columns), axis(home.y, low.y, high.y, rows));
+        let pair = |(dx, x): &(f64, f64), (dy, y): &(f64, f64)| (dx * dx + dy * dy, Vector2::new(*x, *y));
+        let mut begins: Vec<_> = along_x.iter().flat_map(|x| along_y.iter().map(move |y| pair(x, y))).collect();
+        begins.sort_by(|a, b| a.0.total_cmp(&b.0));
+        // In a room with corners that reach in, the first that is all inside; where none is, the first tells what is not.
+        let all_inside = |begin: &Vector2<f64>| rim.into_iter().chain(places()).all(|place| inside(*begin, place));
+        begins.iter().map(|(_, begin)| *begin).find(all_inside).or(begins.first().map(|(_, begin)| *begin))
+    });
+    let fits = |p: &Vector2<f64>| p.x >= low.x && p.y >= low.y && p.x + size(columns) <= high.x && p.y + size(rows) <= high.y;
+    let lowest = lowest.filter(fits).ok_or_else(|| {
         let found =
             format!("{columns}x{rows} places {spacing_m} m apart, which take {:.2} x {:.2} m", size(columns), size(rows));
         let room = high - low;
         invalid("--grid", found, format!("what fits into the room of {:.2} x {:.2} m", room.x, room.y))
-    };
-    let room = |lowest: Vector2<f64>| {
-        let inside = |i: usize, j: usize| {
-            contains_within(&world.outline, lowest + Vector2::new(j as f64, i as f64) * spacing_m, ON_PLACE_M)
-        };
-        let rim = [(0, 0), (0, columns - 1), (rows - 1, 0), (rows - 1, columns - 1)];
-        rim.into_iter().all(|(i, j)| inside(i, j)) && (0..rows).all(|i| (0..columns).all(|j| inside(i, j)))
-    };
-    let lowest = match origin_m {
-        Some([x, y]) => Vector2::new(x, y),
-        None => {
-            // Where the grid may begin along an axis: first with home on a place, the middle of the grid nearest to the room's
-            // first; at last about the room's middle.
-            let axis = |home: f64, low: f64, high: f64, count: usize| -> Vec<(f64, f64)> {
-                let centred = 0.5 * (low + high - size(count));
-                let fits = |begin: f64| begin >= low && begin + size(count) <= high;
-                let mut begins: Vec<(f64, f64)> = (0..count)
-                    .map(|k| home - k as f64 * spacing_m)
-                    .filter(|b| fits(*b))
-                    .map(|b| ((b - centred).abs(), b))
-                    .collect();
-                begins.sort_by(|a, b| a.0.total_cmp(&b.0));
-                begins.truncate(MOST_BEGINS);
-                if begins.is_empty() && fits(centred) {
-                    begins.push((0.0, centred));
-                }
-                begins
-            };
-            let home = world.home.position();
-            let (along_x, along_y) = (axis(home.x, low.x, high.x, columns), axis(home.y, low.y, high.y, rows));
-            let mut begins: Vec<(f64, Vector2<f64>)> = along_x
-                .iter()
-                .flat_map(|(dx, x)| along_y.iter().map(move |(dy, y)| (dx * dx + dy * dy, Vector2::new(*x, *y))))
-                .collect();
-            begins.sort_by(|a, b| a.0.total_cmp(&b.0));
-            let first = begins.first().ok_or_else(too_large)?.1;
-            // In a room with corners that reach in, the first that is all inside; where none is, the first tells what is not.
-            begins.iter().map(|(_, begin)| *begin).find(|begin| room(*begin)).unwrap_or(first)
-        }
-    };
-    if lowest.x + size(columns) > high.x || lowest.y + size(rows) > high.y || lowest.x < low.x || lowest.y < low.y {
-        return Err(too_large());
-    }
-    let at = |i: usize, j: usize| lowest + Vector2::new(j as f64, (rows - 1 - i) as f64) * spacing_m;
-    let places = || (0..rows).flat_map(|i| (0..columns).map(move |j| (i, j)));
-    if let Some((i, j)) = places().find(|&(i, j)| !contains_within(&world.outline, at(i, j), ON_PLACE_M)) {
-        let (p, n) = (at(i, j), columns * rows);
-        let found = format!("place ({i}, {j}) of {n} at ({:.3}, {:.3}) m, outside the room", p.x, p.y);
+    })?;
+    if let Some(place) = places().find(|&place| !inside(lowest, place)) {
+        let (p, n) = (at(lowest, place), columns * rows);
+        let found = format!("place {place:?} of {n} at ({:.3}, {:.3}) m, outside the room", p.x, p.y);
         return Err(invalid("--grid", found, "a grid inside the room; --origin moves it"));
     }
-    let home = world.home.position();
-    let home = places().find(|&(i, j)| (at(i, j) - home).norm() < ON_PLACE_M).map(|(i, j)| [i, j]);
-    Ok(GridDocument { rows, columns, spacing_m, first_m: at(0, 0).into(), home })
+    let home = places().find(|&place| (at(lowest, place) - home).norm() < ON_PLACE_M).map(|(i, j)| [i, j]);
+    Ok(GridDocument { rows, columns, spacing_m, first_m: at(lowest, (0, 0)).into(), home })
 }
 
-/// Reads a route.
+/// Reads a route. Without headings the robot looks along the way: to the next point, at the end as before, and on one point alone
+/// along x.
 fn route(path: &Path) -> Result<Vec<Spot>> {
-    let text = std::fs::read(path).map_err(io_error("read", path))?;
-    let fault = |message: String| Error::Parse { path: path.to_owned(), message };
-    let mut table = csv::ReaderBuilder::new().trim(csv::Trim::All).flexible(true).from_reader(text.as_slice());
-    let header = table.headers().map_err(|e| fault(e.to_string()))?.clone();
-    let position = |name: &str| header.iter().position(|h| h == name);
-    let column = |name: &str| {
-        let found = header.iter().collect::<Vec<_>>().join(",");
-        position(name).ok_or_else(|| fault(format!("line 1: found `{found}`, expected a column `{name}`")))
-    };
-    let (x, y) = (column("x_m")?, column("y_m")?);
-    let heading = position("heading_rad").map(|k| (k, 1.0)).or(position("heading_deg").map(|k| (k, 1_f64.to_radians())));
-    let mut points = Vec::new();
-    for row in table.records() {
-        let row = row.map_err(|e| fault(e.to_string()))?;
-        let line = row.position().map_or(0, csv::Position::line);
-        let number = |k: usize| {
-            let cell = row.get(k).unwrap_or_default();
-            let found = cell.parse().ok().filter(|x: &f64| x.is_finite());
-            found.ok_or_else(|| {
-                fault(format!("line {line}, {}: found `{cell}`, expected a finite number", header.get(k).unwrap_or_default()))
-            })
-        };
-        let heading = heading.map(|(k, to_rad)| Ok::<_, Error>(to_rad * number(k)?)).transpose()?;
-        points.push((Vector2::new(number(x)?, number(y)?), heading));
-    }
-    if points.is_empty() {
-        return Err(fault("found no row, expected one for each point".to_owned()));
-    }
+    let points = film::points(path, &[])?;
     let along = |k: usize| {
-        // To the next point; at the end as before, and on one point alone along x.
         let k = k.min(points.len().saturating_sub(2));
-        points.get(k + 1).map_or(0.0, |(next, _)| angle_of(next - points[k].0))
+        points.get(k + 1).map_or(0.0, |next| angle_of(next.at - points[k].at))
     };
-    let spot = |(k, (p, heading)): (usize, &(Vector2<f64>, Option<f64>))| {
-        let robot = Pose::new(p.x, p.y, heading.unwrap_or_else(|| along(k)));
-        Spot { place: None, robot, time_s: None }
-    };
-    Ok(points.iter().enumerate().map(spot).collect())
+    let robot = |(k, p): (usize, &film::Point)| Pose::new(p.at.x, p.at.y, p.heading.unwrap_or_else(|| along(k)));
+    Ok(points.iter().enumerate().map(robot).map(|robot| Spot { place: None, robot, time_s: None }).collect())
 }

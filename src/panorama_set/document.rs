@@ -8,21 +8,27 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use super::entry::FramePose;
-use super::layout::Layout;
+use super::grid::Place;
+use super::source;
 use crate::error::{Error, Result};
+use crate::geometry::Pose;
 use crate::panorama::Projection;
-use crate::storage::io_error;
+use crate::storage;
 
 /// Name of the file.
 pub const DOCUMENT: &str = "dataset.json";
+/// Most places of a grid, and most poses of a set.
+pub const MOST_PLACES: usize = 10_000_000;
+/// Largest length in a document that is believed, m.
+const MOST_M: f64 = 1e6;
 
 /// What a set is and how it was made.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Document {
     /// Name and version of this format.
     pub format: String,
-    /// How files are named.
-    pub layout: Layout,
+    /// Name of the [`LayoutKind`](super::LayoutKind).
+    pub layout: String,
     /// The command that makes the set, as far as its bytes depend on it.
     pub command: String,
     /// Version of the program.
@@ -108,29 +114,78 @@ pub struct Instance {
     pub landmark: bool,
 }
 
+impl GridDocument {
+    /// Pose of the robot at a place.
+    pub(crate) fn pose(&self, place: Place, heading: f64) -> Pose {
+        let [x, y] = self.first_m;
+        Pose::new(x + place.j as f64 * self.spacing_m, y - place.i as f64 * self.spacing_m, heading)
+    }
+}
+
 impl Document {
     /// The document of the set in `folder`; `None` where there is none.
     ///
     /// # Errors
-    /// When it cannot be read.
+    /// When it cannot be read, or says what no set is.
     pub fn load(folder: &Path) -> Result<Option<Self>> {
         let path = folder.join(DOCUMENT);
-        let text = match std::fs::read_to_string(&path) {
-            Ok(text) => text,
-            Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(None),
-            Err(e) => return Err(io_error("read", &path)(e)),
+        let bytes = match storage::read_within(folder, &path) {
+            Ok(bytes) => bytes,
+            Err(Error::Io { source, .. }) if source.kind() == std::io::ErrorKind::NotFound => return Ok(None),
+            Err(e) => return Err(e),
         };
-        serde_json::from_str(&text).map(Some).map_err(|e| Error::Parse { path, message: e.to_string() })
+        let fault = |message: String| Error::Parse { path: path.clone(), message };
+        let document: Self = serde_json::from_slice(&bytes).map_err(|e| fault(e.to_string()))?;
+        match document.fault() {
+            Some((place, found, allowed)) => Err(fault(format!("{place}: found {found}, allowed is {allowed}"))),
+            None => Ok(Some(document)),
+        }
     }
 
-    /// The document as a file.
-    ///
-    /// # Errors
-    /// When it cannot be put into JSON.
-    pub fn to_json(&self) -> Result<Vec<u8>> {
-        let mut text =
-            serde_json::to_vec_pretty(self).map_err(|e| Error::Parse { path: DOCUMENT.into(), message: e.to_string() })?;
-        text.push(b'\n');
-        Ok(text)
+    /// The first value that no set has: its place, itself, and what is allowed.
+    fn fault(&self) -> Option<(String, String, String)> {
+        let count = |place: &str, found: usize, most: usize| {
+            (!(1..=most).contains(&found)).then(|| (place.to_owned(), found.to_string(), format!("1 to {most}")))
+        };
+        let number = |place: &str, found: f64, low: f64, high: f64| {
+            (!(low..=high).contains(&found)).then(|| (place.to_owned(), found.to_string(), format!("{low} to {high}")))
+        };
+        let length = |place: &str, found: f64| number(place, found, -MOST_M, MOST_M);
+        let angle = |place: &str, found: f64| number(place, found, -1000.0, 1000.0);
+        let (p, rows) = (&self.projection, f64::from(self.projection.height));
+        let grid = || {
+            let g = self.grid.as_ref()?;
+            let home = |place: &str, found: usize, count: usize| {
+                (found >= count).then(|| (place.to_owned(), found.to_string(), format!("0 to {}", count - 1)))
+            };
+            let [x, y] = g.first_m;
+            count("grid.rows", g.rows, MOST_PLACES)
+                .or_else(|| count("grid.columns", g.columns, MOST_PLACES / g.rows))
+                .or_else(|| number("grid.spacing_m", g.spacing_m, 1e-6, MOST_M))
+                .or_else(|| length("grid.first_m[0]", x))
+                .or_else(|| length("grid.first_m[1]", y))
+                .or_else(|| home("grid.home[0]", g.home?[0], g.rows))
+                .or_else(|| home("grid.home[1]", g.home?[1], g.columns))
+        };
+        let conditions = self.conditions.iter().enumerate().find_map(|(k, condition)| {
+            let plain = |c: char| c.is_ascii_alphanumeric() || "-_".contains(c);
+            let found = &condition.name;
+            (found.is_empty() || !found.chars().all(plain))
+                .then(|| (format!("conditions[{k}].name"), format!("{found:?}"), "letters, digits, `-` and `_`".to_owned()))
+        });
+        let most_frames = MOST_PLACES.saturating_mul(self.conditions.len());
+        count("projection.width", p.width as usize, source::MOST_PX as usize)
+            .or_else(|| count("projection.height", p.height as usize, source::MOST_PX as usize))
+            .or_else(|| number("projection.horizon_row", p.horizon_row, -100.0 * rows, 100.0 * rows))
+            .or_else(|| angle("projection.mount_rad", p.mount_rad))
+            .or_else(|| number("camera_height_m", self.camera_height_m, 0.0, MOST_M))
+            .or_else(|| length("home.x_m", self.home.x_m))
+            .or_else(|| length("home.y_m", self.home.y_m))
+            .or_else(|| angle("home.heading_rad", self.home.heading_rad))
+            .or_else(|| angle("heading_rad", self.heading_rad?))
+            .or_else(grid)
+            .or(conditions)
+            .or_else(|| count("frames", self.frames, most_frames))
+            .or_else(|| count("parts", self.parts, self.frames))
     }
 }

@@ -1,10 +1,12 @@
 //! Frames: as they are written, with their truth, and as they are found on disk.
 
-use std::path::PathBuf;
+use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
 use super::grid::Place;
+use super::source::Source;
+use crate::error::{Error, Result};
 use crate::geometry::Pose;
 
 /// A frame to be written: one panorama of a set.
@@ -35,6 +37,20 @@ pub struct Names {
     pub instance: String,
     /// The frame's truth, where the layout has it frame by frame.
     pub truth: Option<String>,
+}
+
+impl Names {
+    /// Four files side by side: `STEM.rgb.png`, `.range.png`, `.instance.png` and `.json`.
+    pub(super) fn side_by_side(stem: &str) -> Self {
+        let file = |ending: &str| format!("{stem}.{ending}");
+        Self { image: file("rgb.png"), range: file("range.png"), instance: file("instance.png"), truth: Some(file("json")) }
+    }
+
+    /// A picture whose layout has no room for range and instances: they lie in `truth/CONDITION/`, where no reader of it looks.
+    pub(super) fn with_truth_aside(image: String, condition: &str, stem: &str) -> Self {
+        let beside = |channel: &str| format!("truth/{condition}/{stem}.{channel}.png");
+        Self { image, range: beside("range"), instance: beside("instance"), truth: None }
+    }
 }
 
 /// A pose as files have it.
@@ -102,24 +118,6 @@ pub struct LandmarkTruth {
     pub occluded: Option<f64>,
 }
 
-/// Where the bytes of a picture are.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) enum Source {
-    /// In a file of their own.
-    File(PathBuf),
-    /// In an uncompressed archive.
-    Member {
-        /// The archive.
-        archive: PathBuf,
-        /// Name within.
-        name: String,
-        /// First byte.
-        offset: u64,
-        /// Length.
-        bytes: u64,
-    },
-}
-
 /// A panorama of a set on disk, with what is known of where it was taken.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Entry {
@@ -143,6 +141,16 @@ impl Entry {
         Self { condition: condition.to_owned(), key: key.into(), place: None, pose: None, image, range: None, instance: None }
     }
 
+    /// Takes place, pose and condition from a frame's truth as JSON; `path` is what errors name.
+    pub(super) fn tell(&mut self, json: &[u8], path: &Path) -> Result<()> {
+        let truth: FrameTruth =
+            serde_json::from_slice(json).map_err(|e| Error::Parse { path: path.to_owned(), message: e.to_string() })?;
+        self.place = truth.place.map(|[i, j]| Place { i, j });
+        self.pose = Some(truth.pose.into());
+        self.condition = truth.condition;
+        Ok(())
+    }
+
     /// Whether it has range and instances beside the picture.
     #[must_use]
     pub fn has_truth(&self) -> bool {
@@ -151,9 +159,7 @@ impl Entry {
 
     /// The picture's file, or the archive that holds it.
     #[must_use]
-    pub fn path(&self) -> &std::path::Path {
-        match &self.image {
-            Source::File(path) | Source::Member { archive: path, .. } => path,
-        }
+    pub fn path(&self) -> &Path {
+        self.image.file()
     }
 }

@@ -1,82 +1,135 @@
-//! Layouts, and what a frame's files are called in each.
+//! What a layout of sets is: how files are named and coded, and how they are found again.
 
-use serde::{Deserialize, Serialize};
-use strum::{EnumMessage, IntoStaticStr, VariantArray};
+use std::path::{Path, PathBuf};
 
-use super::document::Document;
-use super::entry::{Frame, Names};
-use super::{folder, image_database, moeller, vardy, webdataset};
+use super::document::{Document, GridDocument};
+use super::entry::{Entry, Frame, Names};
+use super::source::Source;
+use crate::error::{Error, Result};
 use crate::panorama::{Projection, ProjectionKind};
+use crate::storage::read_within;
 
-/// How a set's files are named and what their pixels mean.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, EnumMessage, IntoStaticStr, VariantArray)]
-#[serde(rename_all = "kebab-case")]
-#[strum(serialize_all = "kebab-case")]
-pub enum Layout {
-    /// Vardy's panoramic image database: CONDITION/I_J.pgm, grey, clockwise.
-    ///
-    /// Also `cv_<rows-1-i>_<j>_bw<bw>.pgm`.
-    Vardy,
-    /// Moeller's: a .db line about the grid, and folders with cv_X_Y_bwBW.pgm, grey, clockwise.
-    Moeller,
-    /// BrainsOnBoard: database_entries.csv, database_metadata.yaml, PNG.
-    ImageDatabase,
-    /// Tar shards for training with `webdataset`.
-    Webdataset,
-    /// A folder a condition; colours, range, instances and truth of each frame.
-    Folder,
-    /// The paper's own set, read only: `<i>_<j>.png` or `.pgm`.
-    Paper,
-}
+/// A layout of panorama sets: both directions, so that what is written in it is read back equal.
+///
+/// A layout is a file of its own in `layouts/` and a line of [`LayoutKind`](super::LayoutKind).
+pub trait Layout: Sync {
+    /// What the card of a set says about its files, in sentences.
+    fn about_files(&self) -> &'static str;
 
-impl Layout {
-    /// Those that are written.
-    pub const WRITTEN: [Self; 5] = [Self::Vardy, Self::Moeller, Self::ImageDatabase, Self::Webdataset, Self::Folder];
+    /// Which files Hugging Face's `datasets` loads as samples: patterns.
+    fn samples(&self, _set: &Document) -> Vec<String> {
+        Vec::new()
+    }
 
-    /// What files and the command line call it.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        self.into()
+    /// Whether sets are written in it, not only read.
+    fn is_written(&self) -> bool {
+        true
     }
 
     /// Whether its pictures are grey.
-    #[must_use]
-    pub fn is_grey(self) -> bool {
-        matches!(self, Self::Vardy | Self::Moeller)
+    fn is_grey(&self) -> bool {
+        false
     }
 
     /// Whether azimuth falls as the column grows.
-    #[must_use]
-    pub fn is_clockwise(self) -> bool {
-        matches!(self, Self::Vardy | Self::Moeller)
+    fn is_clockwise(&self) -> bool {
+        false
     }
 
-    /// Whether it can only hold one picture a place of a grid.
-    #[must_use]
-    pub fn needs_grid(self) -> bool {
-        matches!(self, Self::Vardy | Self::Moeller)
+    /// The projection of its pictures: a camera's own, or the layout's where that leaves no choice.
+    fn projection(&self, camera: Projection) -> Projection {
+        camera
     }
 
-    /// The projection in which pictures are rendered for it: a camera's own, or the layout's where that leaves no choice.
-    #[must_use]
-    pub fn projection(self, camera: Projection) -> Projection {
-        match self {
-            Self::Vardy | Self::Moeller => equal_angle(camera.width, camera.height),
-            _ => camera,
-        }
+    /// What keeps a set out of this layout, if anything does: what was found and what is allowed. `grid` is that of the set;
+    /// `one_heading` says whether the robot looks one way at each place.
+    fn refuses(&self, _grid: Option<&GridDocument>, _one_heading: bool) -> Option<(String, &'static str)> {
+        None
     }
 
     /// What a frame's files are called.
-    #[must_use]
-    pub fn names(self, frame: &Frame, set: &Document) -> Names {
-        match self {
-            Self::Vardy | Self::Paper => vardy::names(frame),
-            Self::Moeller => moeller::names(frame, set),
-            Self::ImageDatabase => image_database::names(frame, set),
-            Self::Webdataset => webdataset::names(frame),
-            Self::Folder => folder::names(frame),
-        }
+    fn names(&self, frame: &Frame, set: &Document) -> Names;
+
+    /// The archive that holds the frames of a condition's part; `None` where each file stands for itself.
+    fn archive(&self, _condition: &str, _part: usize) -> Option<String> {
+        None
     }
+
+    /// Names and contents of what lies beside the pictures once all are there. `frames` gives those of each condition of the
+    /// document.
+    fn lists(&self, _set: &Document, _frames: &dyn Fn(usize) -> Vec<Frame>) -> Vec<(String, String)> {
+        Vec::new()
+    }
+
+    /// Whether a set's folder is searched as a whole; else each condition has a folder, and one of these alone is a set, too.
+    fn is_one_folder(&self) -> bool {
+        false
+    }
+
+    /// Whether a folder holds panoramas of this layout.
+    fn holds(&self, folder: &Path) -> Result<bool>;
+
+    /// The panoramas of a folder.
+    fn find(&self, search: &Search<'_>) -> Result<Found>;
+}
+
+/// Where a layout looks for panoramas.
+#[derive(Clone, Copy)]
+pub struct Search<'a> {
+    /// The set's folder: nothing outside is opened.
+    pub root: &'a Path,
+    /// The folder with the panoramas of a condition, or that of the set.
+    pub folder: &'a Path,
+    /// The condition; empty where it has no name.
+    pub condition: &'a str,
+    /// The grid, where the set's document tells it.
+    pub grid: Option<&'a GridDocument>,
+}
+
+impl Search<'_> {
+    /// The text of a file of the set.
+    pub fn text(&self, path: &Path) -> Result<String> {
+        let text = String::from_utf8(read_within(self.root, path)?);
+        text.map_err(|e| Error::Parse { path: path.to_owned(), message: format!("found {e}, expected UTF-8") })
+    }
+
+    /// A file of the set, if it is there.
+    pub(super) fn file(&self, path: PathBuf) -> Option<Source> {
+        path.is_file().then_some(Source::File(path))
+    }
+
+    /// The panorama whose picture is `file`, with range and instances where they lie in `truth/CONDITION/`.
+    pub fn entry_with_truth_aside(&self, file: PathBuf) -> Entry {
+        let name = file.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let stem = name.rsplit_once('.').map_or(name.as_str(), |(stem, _)| stem);
+        let beside =
+            |channel: &str| self.file(self.root.join("truth").join(self.condition).join(format!("{stem}.{channel}.png")));
+        let (range, instance) = (beside("range"), beside("instance"));
+        Entry { range, instance, ..Entry::new(self.condition, stem, Source::File(file)) }
+    }
+}
+
+/// What a layout found.
+pub struct Found {
+    /// Panoramas, in order.
+    pub entries: Vec<Entry>,
+    /// What files say in contradiction to one another.
+    pub warnings: Vec<String>,
+    /// Angle between rows (rad) and row of the horizon, where the layout tells.
+    pub vertical: Option<(f64, f64)>,
+}
+
+impl Found {
+    /// Panoramas, and nothing else to say.
+    pub fn new(entries: Vec<Entry>) -> Self {
+        Self { entries, warnings: Vec::new(), vertical: None }
+    }
+}
+
+/// The refusal of a layout with one picture for each place of a grid.
+pub(super) fn grid_only(grid: Option<&GridDocument>, one_heading: bool) -> Option<(String, &'static str)> {
+    let found = if grid.is_none() { "no --grid" } else { "several headings at a place" };
+    (grid.is_none() || !one_heading).then(|| (found.into(), "a grid with one heading for all: it holds one picture a place"))
 }
 
 /// Column 0 ahead, horizon in the middle, rows even in elevation.

@@ -1,8 +1,12 @@
 //! Panorama sets on disk: the layouts of the field, written and read back.
 //!
 //! A [`Layout`] says how a set's files are named, how their pixels are coded and which way azimuth runs over the columns; each has
-//! a file of its own here that holds both directions, so that what is written in a layout is read back equal. A set that this
-//! program wrote carries a [`Document`] (`dataset.json`); real sets have none, and then the layout's own conventions hold.
+//! a file of its own in `layouts/` that holds both directions, so that what is written in a layout is read back equal, and a line
+//! in the list [`LayoutKind`]. A set that this program wrote carries a [`Document`] (`dataset.json`); real sets have none, and then
+//! the layout's own conventions hold.
+//!
+//! Sets may come from anyone: only plain files inside their folder are opened, links resolved, and no number of theirs asks for more
+//! memory than a set of this program does.
 //!
 //! | layout | pictures | columns | rows |
 //! |---|---|---|---|
@@ -18,29 +22,23 @@
 //! Whatever a set's own sense of azimuth, [`PanoramaSet::load`] gives a [`Panorama`](crate::panorama::Panorama) whose columns run
 //! anti-clockwise. A [`Grid`] says where the places of a set lie about its home.
 
-mod decode;
 mod document;
 mod encode;
 mod entry;
-mod folder;
 mod grid;
-mod image_database;
 mod layout;
-mod moeller;
+mod layouts;
 mod set;
-mod vardy;
-mod webdataset;
+mod source;
 mod yaml;
 
-pub use decode::mirror;
-pub use document::{ConditionDocument, DOCUMENT, Document, GridDocument, Instance};
+pub use document::{ConditionDocument, DOCUMENT, Document, GridDocument, Instance, MOST_PLACES};
 pub use encode::{
     Coding, encode_grey, encode_instance, encode_range, encode_rgb, modes, packed_instance, packed_range, packed_rgb,
 };
 pub use entry::{Entry, Frame, FramePose, FrameTruth, LandmarkTruth, Names};
 pub use grid::{Cell, Grid, Place};
-pub use image_database::{ENTRIES, METADATA, entries_csv, metadata_yaml};
 pub use layout::Layout;
-pub use moeller::{BANDWIDTH, database_line, database_name};
+pub use layouts::LayoutKind;
 pub use set::PanoramaSet;
-pub use webdataset::{Shard, shard_name};
+pub use source::mirror;

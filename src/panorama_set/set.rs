@@ -1,42 +1,29 @@
 //! Opening a set, whatever its layout, and loading its panoramas.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-use super::decode::{even_rows, mirror, numbers, picture};
-use super::document::{Document, GridDocument};
+use strum::VariantArray;
+
+use super::document::{DOCUMENT, Document, MOST_PLACES};
 use super::entry::Entry;
 use super::grid::{Grid, Place};
-use super::layout::{Layout, equal_angle};
-use super::{folder, image_database, moeller, vardy, webdataset};
+use super::layout::{Found, Search};
+use super::layouts::LayoutKind;
+use super::source::{even_rows, file_names, mirror, numbers, picture};
 use crate::error::{Error, Result};
-use crate::geometry::Pose;
 use crate::panorama::{Panorama, Projection};
-use crate::storage::io_error;
 
 /// Folders of a set that hold no condition.
 const RESERVED: [&str; 6] = ["truth", "examples", "parts", "home", "shards", "DATA2"];
 /// Vertical steps of a real set may differ by this share from the horizontal ones before rows are resampled.
 const EVEN: f64 = 1e-3;
 
-/// What a layout's reader found.
-pub(super) struct Found {
-    pub entries: Vec<Entry>,
-    pub warnings: Vec<String>,
-    /// Angle between rows (rad) and row of the horizon, where the layout tells.
-    pub vertical: Option<(f64, f64)>,
-}
-
-impl Found {
-    pub fn new(entries: Vec<Entry>) -> Self {
-        Self { entries, warnings: Vec::new(), vertical: None }
-    }
-}
-
 /// A set of panoramas on disk.
 #[derive(Debug, Clone)]
 pub struct PanoramaSet {
     folder: PathBuf,
-    layout: Layout,
+    layout: LayoutKind,
     entries: Vec<Entry>,
     document: Option<Document>,
     vertical: Option<(f64, f64)>,
@@ -51,13 +38,16 @@ impl PanoramaSet {
     /// When the folder cannot be read, is of no layout that is known, or does not keep to it.
     pub fn open(folder: &Path) -> Result<Self> {
         let layout = match Document::load(folder)? {
-            Some(document) => document.layout,
+            Some(Document { layout, .. }) => layout.parse().map_err(|_| Error::Parse {
+                path: folder.join(DOCUMENT),
+                message: format!("layout: found `{layout}`, allowed is one of {}", LayoutKind::names()),
+            })?,
             None => detect(folder)?.ok_or_else(|| Error::Parse {
                 path: folder.to_owned(),
-                message:
-                    "found no set of panoramas, neither in it nor in its folders; expected one of the layouts vardy, moeller, \
-                          image-database, webdataset, folder or paper"
-                        .to_owned(),
+                message: format!(
+                    "found no set of panoramas, neither in it nor in its folders; expected one of the layouts {}",
+                    LayoutKind::names()
+                ),
             })?,
         };
         Self::open_as(folder, layout)
@@ -67,59 +57,35 @@ impl PanoramaSet {
     ///
     /// # Errors
     /// As [`PanoramaSet::open`].
-    pub fn open_as(folder: &Path, layout: Layout) -> Result<Self> {
+    pub fn open_as(folder: &Path, layout: LayoutKind) -> Result<Self> {
         let document = Document::load(folder)?;
-        let grid = document.as_ref().and_then(|d| d.grid.as_ref());
-        let in_each = |holds: &dyn Fn(&Path) -> Result<bool>, find: &dyn Fn(&Path, &str) -> Result<Found>| -> Result<Found> {
-            if document.is_none() && holds(folder)? {
-                return find(folder, "");
-            }
-            let mut all = Found::new(Vec::new());
-            for condition in conditions(folder, document.as_ref())? {
-                let path = folder.join(&condition);
-                if holds(&path)? {
-                    let found = find(&path, &condition)?;
-                    all.entries.extend(found.entries);
-                    all.warnings.extend(found.warnings);
-                }
-            }
-            // In a folder without any panorama the layout's reader says what it expects.
-            if all.entries.is_empty() { find(folder, "") } else { Ok(all) }
-        };
-        let found = match layout {
-            Layout::Vardy | Layout::Paper => in_each(&|path| vardy::holds(path, layout), &|path, condition| {
-                vardy::find(folder, path, condition, layout, grid)
-            }),
-            Layout::Moeller => moeller::find(folder),
-            Layout::ImageDatabase => in_each(&|path| Ok(path.join(image_database::ENTRIES).is_file()), &|path, condition| {
-                image_database::find(folder, path, condition, grid)
-            }),
-            Layout::Webdataset => webdataset::find(folder),
-            Layout::Folder => in_each(&|path| folder::holds(path), &|path, condition| folder::find(path, condition)),
-        }?;
-        if found.entries.is_empty() {
-            let message = format!("found no panorama of layout {}", layout.name());
-            return Err(Error::Parse { path: folder.to_owned(), message });
-        }
-        let mut entries = found.entries;
+        let mut found = find(folder, layout, document.as_ref())?;
         if let Some(document) = &document {
-            let rank = |entry: &Entry| document.conditions.iter().position(|c| c.name == entry.condition);
-            entries.sort_by_key(rank);
+            found.entries.sort_by_key(|entry| document.conditions.iter().position(|c| c.name == entry.condition));
             if let (Some(grid), Some(heading)) = (&document.grid, document.heading_rad) {
-                let place = |place: Place| {
-                    let s = grid.spacing_m;
-                    Pose::new(grid.first_m[0] + place.j as f64 * s, grid.first_m[1] - place.i as f64 * s, heading)
-                };
-                for entry in entries.iter_mut().filter(|e| e.pose.is_none()) {
-                    entry.pose = entry.place.map(place);
+                for entry in found.entries.iter_mut().filter(|e| e.pose.is_none()) {
+                    entry.pose = entry.place.map(|place| grid.pose(place, heading));
                 }
             }
         }
         for warning in &found.warnings {
             log::warn!("{warning}");
         }
-        let (folder, warnings, vertical) = (folder.to_owned(), found.warnings, found.vertical);
-        Ok(Self { folder, layout, entries, document, vertical, warnings })
+        let Found { entries, warnings, vertical } = found;
+        let set = Self { folder: folder.to_owned(), layout, entries, document, vertical, warnings };
+        let (rows, columns) = set.shape();
+        let outside = |entry: &&Entry| entry.place.is_some_and(|p| p.i >= rows || p.j >= columns);
+        match set.entries.iter().find(outside) {
+            _ if rows.saturating_mul(columns) > MOST_PLACES => Err(Error::Parse {
+                path: set.folder,
+                message: format!("found a grid of {rows} x {columns} places, expected at most {MOST_PLACES}"),
+            }),
+            Some(Entry { place: Some(Place { i, j }), image, .. }) => Err(Error::Parse {
+                path: image.file().to_owned(),
+                message: format!("found place ({i}, {j}), expected one of the {rows} x {columns} from (0, 0)"),
+            }),
+            _ => Ok(set),
+        }
     }
 
     /// The set's folder.
@@ -130,7 +96,7 @@ impl PanoramaSet {
 
     /// Its layout.
     #[must_use]
-    pub fn layout(&self) -> Layout {
+    pub fn layout(&self) -> LayoutKind {
         self.layout
     }
 
@@ -155,13 +121,8 @@ impl PanoramaSet {
     /// Names of its conditions, in order.
     #[must_use]
     pub fn conditions(&self) -> Vec<&str> {
-        let mut names: Vec<&str> = Vec::new();
-        for entry in &self.entries {
-            if !names.contains(&entry.condition.as_str()) {
-                names.push(&entry.condition);
-            }
-        }
-        names
+        let mut seen = BTreeSet::new();
+        self.entries.iter().map(|entry| entry.condition.as_str()).filter(|name| seen.insert(*name)).collect()
     }
 
     /// The set with the panoramas of one condition alone.
@@ -183,10 +144,12 @@ impl PanoramaSet {
     /// Rows and columns of the grid, those of places without a panorama included; (0, 0) for a set without places.
     #[must_use]
     pub fn shape(&self) -> (usize, usize) {
-        if let Some(GridDocument { rows, columns, .. }) = self.document.as_ref().and_then(|d| d.grid.as_ref()) {
-            return (*rows, *columns);
+        if let Some(grid) = self.document.as_ref().and_then(|d| d.grid.as_ref()) {
+            return (grid.rows, grid.columns);
         }
-        let most = |of: fn(Place) -> usize| self.entries.iter().filter_map(|e| e.place).map(of).max().map_or(0, |k| k + 1);
+        let most = |of: fn(Place) -> usize| {
+            self.entries.iter().filter_map(|e| e.place).map(of).max().map_or(0, |k| k.saturating_add(1))
+        };
         (most(|p| p.i), most(|p| p.j))
     }
 
@@ -196,7 +159,7 @@ impl PanoramaSet {
     /// Which place has none.
     pub fn whole(self) -> Result<Self> {
         let (rows, columns) = self.shape();
-        let held: std::collections::BTreeSet<Place> = self.entries.iter().filter_map(|e| e.place).collect();
+        let held: BTreeSet<Place> = self.entries.iter().filter_map(|e| e.place).collect();
         let missing = (0..rows).flat_map(|i| (0..columns).map(move |j| Place { i, j })).find(|p| !held.contains(p));
         match missing {
             None => Ok(self),
@@ -249,19 +212,19 @@ impl PanoramaSet {
     /// When there are not so many.
     pub fn load(&self, k: usize) -> Result<Panorama> {
         let entry = &self.entries[k];
-        let mut panorama = picture(&entry.image, |width, height| self.projection(width, height))?;
+        let mut panorama = picture(&self.folder, &entry.image, |width, height| self.projection(width, height))?;
         if let (Some(range), Some(instance)) = (&entry.range, &entry.instance) {
-            let millimetres = numbers(range, panorama.projection)?;
+            let millimetres = numbers(&self.folder, range, panorama.projection)?;
             panorama.range_m = millimetres.into_iter().map(|mm| f32::from(mm) / 1000.0).collect();
-            panorama.instance = numbers(instance, panorama.projection)?;
+            panorama.instance = numbers(&self.folder, instance, panorama.projection)?;
         }
-        if self.layout.is_clockwise() {
+        if self.layout.layout().is_clockwise() {
             mirror(&mut panorama);
         }
         let pixel = panorama.projection.pixel_rad();
         match self.vertical {
             Some((step_rad, horizon)) if (step_rad / pixel - 1.0).abs() > EVEN && panorama.range_m.is_empty() => {
-                Ok(even_rows(&panorama, step_rad, horizon))
+                even_rows(&panorama, step_rad, horizon, entry.path())
             }
             _ => Ok(panorama),
         }
@@ -269,62 +232,57 @@ impl PanoramaSet {
 
     fn projection(&self, width: u32, height: u32) -> Projection {
         let told = self.document.as_ref().map(|d| d.projection).filter(|p| (p.width, p.height) == (width, height));
-        told.unwrap_or_else(|| match self.layout {
-            Layout::Vardy => equal_angle(width, height),
-            Layout::Moeller => {
-                let even = equal_angle(width, height);
-                let horizon = self.vertical.map_or(even.horizon_row, |(_, horizon)| horizon + 0.5);
-                Projection { horizon_row: horizon, ..even }
-            }
-            _ => Projection::new(width, height),
+        told.unwrap_or_else(|| {
+            let own = self.layout.layout().projection(Projection::new(width, height));
+            Projection { horizon_row: self.vertical.map_or(own.horizon_row, |(_, horizon)| horizon + 0.5), ..own }
         })
     }
 }
 
-/// What layout a folder's files are of.
-fn detect(folder: &Path) -> Result<Option<Layout>> {
-    if folder.join(image_database::ENTRIES).is_file() {
-        return Ok(Some(Layout::ImageDatabase));
-    }
-    if !moeller::databases(folder)?.is_empty() {
-        return Ok(Some(Layout::Moeller));
-    }
-    if !webdataset::shards(folder)?.is_empty() {
-        return Ok(Some(Layout::Webdataset));
-    }
-    let below: Vec<PathBuf> = conditions(folder, None)?.into_iter().map(|name| folder.join(name)).collect();
-    for place in std::iter::once(folder.to_owned()).chain(below) {
-        if place.join(image_database::ENTRIES).is_file() {
-            return Ok(Some(Layout::ImageDatabase));
-        }
-        for layout in [Layout::Vardy, Layout::Paper] {
-            if vardy::holds(&place, layout)? {
-                return Ok(Some(layout));
+/// All panoramas of a set.
+fn find(folder: &Path, kind: LayoutKind, document: Option<&Document>) -> Result<Found> {
+    let layout = kind.layout();
+    let grid = document.and_then(|d| d.grid.as_ref());
+    let whole = Search { root: folder, folder, condition: "", grid };
+    let mut found = Found::new(Vec::new());
+    if !layout.is_one_folder() && (document.is_some() || !layout.holds(folder)?) {
+        for condition in
+            document.map_or_else(|| conditions(folder), |d| Ok(d.conditions.iter().map(|c| c.name.clone()).collect()))?
+        {
+            let below = folder.join(&condition);
+            if below.is_dir() && layout.holds(&below)? {
+                let one = layout.find(&Search { folder: &below, condition: &condition, ..whole })?;
+                found.entries.extend(one.entries);
+                found.warnings.extend(one.warnings);
             }
         }
-        if folder::holds(&place)? {
-            return Ok(Some(Layout::Folder));
+    }
+    // In a folder without any panorama the layout says what it expects.
+    if found.entries.is_empty() {
+        found = layout.find(&whole)?;
+    }
+    if found.entries.is_empty() {
+        let message = format!("found no panorama of layout {}", kind.name());
+        return Err(Error::Parse { path: folder.to_owned(), message });
+    }
+    Ok(found)
+}
+
+/// The layout of a folder's files, or of those in the folders of its conditions.
+fn detect(folder: &Path) -> Result<Option<LayoutKind>> {
+    let below = conditions(folder)?.into_iter().map(|name| folder.join(name));
+    for (k, place) in std::iter::once(folder.to_owned()).chain(below).enumerate() {
+        for kind in LayoutKind::VARIANTS {
+            if (k == 0 || !kind.layout().is_one_folder()) && kind.layout().holds(&place)? {
+                return Ok(Some(*kind));
+            }
         }
     }
     Ok(None)
 }
 
-/// Names of the folders that may hold a condition, in the document's order where there is one.
-fn conditions(folder: &Path, document: Option<&Document>) -> Result<Vec<String>> {
-    if let Some(document) = document {
-        return Ok(document.conditions.iter().map(|c| c.name.clone()).filter(|name| folder.join(name).is_dir()).collect());
-    }
+/// Names of the folders that may hold a condition.
+fn conditions(folder: &Path) -> Result<Vec<String>> {
     let names = file_names(folder)?.into_iter().filter(|name| !name.starts_with('.') && !RESERVED.contains(&name.as_str()));
     Ok(names.filter(|name| folder.join(name).is_dir()).collect())
-}
-
-/// Names of what is in a folder, sorted; those that are no text are passed over.
-pub(super) fn file_names(folder: &Path) -> Result<Vec<String>> {
-    let mut names = Vec::new();
-    for entry in std::fs::read_dir(folder).map_err(io_error("read folder", folder))? {
-        let name = entry.map_err(io_error("read folder", folder))?.file_name();
-        names.extend(name.to_str().map(str::to_owned));
-    }
-    names.sort();
-    Ok(names)
 }

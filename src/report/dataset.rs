@@ -16,16 +16,16 @@ pub const FILES: &[&str] = &["README.md", "speed.json"];
 ///
 /// # Errors
 /// When a picture cannot be encoded.
-pub fn card(document: &Document, home: &Panorama) -> Result<Vec<(String, Vec<u8>)>> {
+pub fn card(layout: &dyn Layout, document: &Document, home: &Panorama) -> Result<Vec<(String, Vec<u8>)>> {
     let mut sheet = Sheet::new();
     sheet.add(home);
     Ok(vec![
-        ("README.md".into(), card_text(document).into_bytes()),
+        ("README.md".into(), card_text(layout, document).into_bytes()),
         ("examples/home.png".into(), sheet.png("examples/home.png")?),
     ])
 }
 
-fn card_text(d: &Document) -> String {
+fn card_text(layout: &dyn Layout, d: &Document) -> String {
     let mut text = format!(
         "---\nlicense: {}\npretty_name: Panoramas of {}\ntags:\n- robotics\n- visual-homing\n- panorama\n- synthetic\nconfigs:\n",
         d.licence.to_lowercase(),
@@ -34,8 +34,8 @@ fn card_text(d: &Document) -> String {
     for table in ["frames", "landmarks", "matches"] {
         let _ = write!(text, "- config_name: {table}\n  data_files: truth/{table}-*.parquet\n");
     }
-    if d.layout == Layout::Webdataset {
-        text += "- config_name: samples\n  data_files: shards/*.tar\n";
+    for files in layout.samples(d) {
+        let _ = write!(text, "- config_name: samples\n  data_files: {files}\n");
     }
     let p = d.projection;
     let _ = write!(
@@ -67,37 +67,14 @@ fn card_text(d: &Document) -> String {
             g.home.map_or_else(String::new, |[i, j]| format!("; home is place ({i}, {j})"))
         );
     }
-    let _ = write!(text, "\n## Files\n\nLayout: `{}`. {}\n", d.layout.name(), files(d.layout));
-    text += &projection(d);
+    let _ = write!(text, "\n## Files\n\nLayout: `{}`. {}\n", d.layout, layout.about_files());
+    text += &projection(layout, d);
     text += TRUTH;
     text
 }
 
-fn files(layout: Layout) -> &'static str {
-    match layout {
-        Layout::Vardy => {
-            "Pictures are `CONDITION/I_J.pgm`, 8-bit grey; range and instances of each are `truth/CONDITION/I_J.range.png` and \
-             `.instance.png`."
-        }
-        Layout::Moeller => {
-            "`DATA2/*.db` holds `w xmin xmax ymin ymax vertRes horizon`; pictures are `cv_X_Y_bwBW.pgm`, 8-bit grey, X = rows - 1 - i \
-             and Y = j; range and instances of each lie in `truth/CONDITION/`."
-        }
-        Layout::ImageDatabase => {
-            "Each condition's folder is an image database: `database_entries.csv` (mm and degrees), `database_metadata.yaml` and the \
-             pictures; range and instances of each lie in `truth/CONDITION/`."
-        }
-        Layout::Webdataset => {
-            "Samples are `KEY.rgb.png`, `KEY.range.png`, `KEY.instance.png` and `KEY.json` in `shards/*.tar`."
-        }
-        Layout::Folder | Layout::Paper => {
-            "A frame is `CONDITION/N.rgb.png`, `.range.png`, `.instance.png` and `.json`; the same N is the same pose in every condition."
-        }
-    }
-}
-
-fn projection(d: &Document) -> String {
-    let (p, clockwise) = (d.projection, d.layout.is_clockwise());
+fn projection(layout: &dyn Layout, d: &Document) -> String {
+    let (p, clockwise) = (d.projection, layout.is_clockwise());
     let column = if clockwise { "falls" } else { "grows" };
     let rows = match p.kind {
         crate::panorama::ProjectionKind::Cylindrical => "the tangent of elevation",

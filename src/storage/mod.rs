@@ -3,7 +3,7 @@
 mod folder;
 
 use std::fs;
-use std::io::{self, Write};
+use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 
 use sha2::{Digest, Sha256};
@@ -15,6 +15,9 @@ pub(crate) use folder::{MARKER, files, remove};
 
 /// Ending of files that are still being written.
 pub const PARTIAL: &str = ".wayhome-partial";
+
+/// Longest file of a stranger that is read whole, bytes.
+const MOST_BYTES: u64 = 1 << 29;
 
 /// A name that no other process takes at the same time, on this machine or on another one that sees the folder.
 pub(crate) fn partial_name(path: &Path) -> PathBuf {
@@ -56,16 +59,65 @@ pub fn sha256(bytes: &[u8]) -> String {
     hex(&Sha256::digest(bytes))
 }
 
+/// Opens a file that belongs to a folder, whoever made the folder, and gives its length: a plain file in it once all links are
+/// resolved, so that neither a path nor a link leads out of it, and no pipe or device is waited for.
+///
+/// # Errors
+/// When the file cannot be read, lies elsewhere or is not plain.
+pub fn open_within(folder: &Path, path: &Path) -> Result<(fs::File, u64)> {
+    // An empty path is the current folder.
+    let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
+    let within = folder.canonicalize().map_err(io_error("read folder", folder))?;
+    let file = path.canonicalize().map_err(io_error("read", path))?;
+    let about = file.metadata().map_err(io_error("read", path))?;
+    let fault = |found: String| Error::Parse {
+        path: path.to_owned(),
+        message: format!("found {found}, expected a plain file in {}", folder.display()),
+    };
+    if !file.starts_with(&within) {
+        return Err(fault(format!("the way to {}", file.display())));
+    }
+    if !about.is_file() {
+        return Err(fault(if about.is_dir() { "a folder" } else { "a pipe or a device" }.into()));
+    }
+    Ok((fs::File::open(&file).map_err(io_error("read", path))?, about.len()))
+}
+
+/// All of such a file, as [`open_within`] opens it.
+///
+/// # Errors
+/// As there, and when the file is longer than 512 MiB.
+pub fn read_within(folder: &Path, path: &Path) -> Result<Vec<u8>> {
+    let (file, bytes) = open_within(folder, path)?;
+    read_piece(file, bytes, path)
+}
+
+/// So many bytes from where a file stands; `path` is what errors call them.
+///
+/// # Errors
+/// When they are more than 512 MiB, or the file ends before.
+pub fn read_piece(file: fs::File, bytes: u64, path: &Path) -> Result<Vec<u8>> {
+    let fault = |message: String| Error::Parse { path: path.to_owned(), message };
+    if bytes > MOST_BYTES {
+        return Err(fault(format!("found {bytes} bytes, expected at most {MOST_BYTES}")));
+    }
+    let mut held = Vec::new();
+    file.take(bytes).read_to_end(&mut held).map_err(io_error("read", path))?;
+    if (held.len() as u64) < bytes {
+        return Err(fault(format!("found {} of {bytes} bytes, it is cut off", held.len())));
+    }
+    Ok(held)
+}
+
 /// SHA-256 and length of a file, which is read piece by piece.
 ///
 /// # Errors
 /// When the file cannot be read.
-pub fn sha256_of_file(path: &Path) -> io::Result<(String, u64)> {
-    let mut file = fs::File::open(path)?;
+pub fn sha256_of_file(mut file: fs::File) -> io::Result<(String, u64)> {
     let (mut hash, mut bytes) = (Sha256::new(), 0);
     let mut buffer = vec![0; 1 << 17];
     loop {
-        match io::Read::read(&mut file, &mut buffer)? {
+        match file.read(&mut buffer)? {
             0 => return Ok((hex(&hash.finalize()), bytes)),
             n => {
                 hash.update(&buffer[..n]);
@@ -169,7 +221,10 @@ mod tests {
         // The example of FIPS 180-2.
         let abc = "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad";
         assert_eq!(file.complete().unwrap(), (abc.to_owned(), 3));
-        assert_eq!((sha256_of_file(&path).unwrap(), sha256(b"abc")), ((abc.to_owned(), 3), abc.to_owned()));
+        assert_eq!(
+            (sha256_of_file(fs::File::open(&path).unwrap()).unwrap(), sha256(b"abc")),
+            ((abc.to_owned(), 3), abc.to_owned())
+        );
         assert!(free_bytes(folder.path()).is_none_or(|b| b > 0));
     }
 }

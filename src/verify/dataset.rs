@@ -13,7 +13,7 @@ use crate::dataset::plan::{Headings, Places, Plan, Request};
 use crate::error::{Error, Result};
 use crate::panorama::{Panorama, Projection};
 use crate::panorama_set::{
-    Layout, encode_instance, encode_range, encode_rgb, modes, packed_instance, packed_range, packed_rgb,
+    LayoutKind, encode_instance, encode_range, encode_rgb, modes, packed_instance, packed_range, packed_rgb,
 };
 use crate::render::{CpuRenderer, Renderer, Scene, View};
 use crate::study::statistics::quantile;
@@ -27,13 +27,13 @@ const ROUNDS: usize = 5;
 const SAMPLES: usize = 16;
 
 /// Layouts that are measured: a file for each picture, and many pictures in an archive.
-pub const LAYOUTS: [Layout; 2] = [Layout::Folder, Layout::Webdataset];
+pub const LAYOUTS: [LayoutKind; 2] = [LayoutKind::Folder, LayoutKind::Webdataset];
 
 /// Panoramas a second by themselves and all together.
 #[derive(Debug, Clone, Serialize)]
 pub struct Rates {
     /// Layout of the set.
-    pub layout: Layout,
+    pub layout: LayoutKind,
     /// Columns.
     pub width: u32,
     /// Rows.
@@ -130,7 +130,7 @@ fn samples(world: &World, projection: Projection) -> Result<Vec<Panorama>> {
     Ok(seen)
 }
 
-fn request(frames: usize, size_px: (u32, u32), layout: Layout) -> Request {
+fn request(frames: usize, size_px: (u32, u32), layout: LayoutKind) -> Request {
     Request {
         places: Places::Random(frames),
         headings: Headings::Random(1),
@@ -171,12 +171,12 @@ fn measure_size(
         .prefix("wayhome-dataset-bench-")
         .tempdir_in(scratch)
         .map_err(crate::storage::io_error("make a folder in", scratch))?;
-    let pipeline = |layout: Layout, round: usize| -> Result<f64> {
+    let pipeline = |layout: LayoutKind, round: usize| -> Result<f64> {
         let plan = Plan::new(world, request(frames, size, layout))?;
         // A folder of its own, which stays until all is measured: some file systems are slow to create files after many were
         // removed.
         let out = scratch.path().join(format!("{}-{round}", layout.name()));
-        let job = Job { plan: &plan, out: &out, shard: (1, 1), extras: &|_, _| Ok(Vec::new()) };
+        let job = Job { plan: &plan, out: &out, shard: (1, 1), extras: &|_, _, _| Ok(Vec::new()) };
         // From when the scene is packed, as in the measure of rendering alone.
         let mut start = None;
         let made = job.run(&mut CpuRenderer::new(), &mut |_| {

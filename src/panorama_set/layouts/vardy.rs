@@ -1,99 +1,112 @@
 //! Vardy's panoramic image database, the variant of it with x mirrored, and the paper's own set: `<i>_<j>` in a folder.
 //!
-//! Azimuth is 2 pi - delta column and elevation delta ((h - 1) / 2 - row), with delta = 2 pi / width. Pictures are grey. Where
-//! the first index counts backwards, `cv_<rows-1-i>_<j>_bw<bw>.pgm`, it is turned round. Indices may begin at 0 or 1.
+//! In Vardy's pictures azimuth is 2 pi - delta column and elevation delta ((h - 1) / 2 - row), with delta = 2 pi / width; they are
+//! grey. Where the first index counts backwards, `cv_<rows-1-i>_<j>_bw<bw>.pgm`, it is turned round. Indices may begin at 0 or 1.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use super::document::GridDocument;
-use super::entry::{Entry, Frame, Names, Source};
-use super::grid::Place;
-use super::layout::Layout;
-use super::set::{Found, file_names};
 use crate::error::{Error, Result};
+use crate::panorama::Projection;
+use crate::panorama_set::document::{Document, GridDocument};
+use crate::panorama_set::entry::{Entry, Frame, Names};
+use crate::panorama_set::grid::Place;
+use crate::panorama_set::layout::{Found, Layout, Search, equal_angle, grid_only};
+use crate::panorama_set::source::file_names;
 
-pub(super) fn names(frame: &Frame) -> Names {
-    let (condition, Place { i, j }) = (&frame.condition, frame.place.unwrap_or(Place { i: 0, j: frame.spot }));
-    Names::with_truth_aside(format!("{condition}/{i}_{j}.pgm"), condition, &format!("{i}_{j}"))
+/// See [`super::LayoutKind::Vardy`].
+pub(super) const VARDY: Indexed = Indexed { is_vardy: true };
+/// See [`super::LayoutKind::Paper`].
+pub(super) const PAPER: Indexed = Indexed { is_vardy: false };
+
+/// Pictures that are called by the indices of their places.
+pub(super) struct Indexed {
+    is_vardy: bool,
 }
 
-impl Names {
-    /// Names of a frame whose layout has no room for range and instances.
-    pub(super) fn with_truth_aside(image: String, condition: &str, stem: &str) -> Self {
-        let beside = |channel: &str| format!("truth/{condition}/{stem}.{channel}.png");
-        Self { image, range: beside("range"), instance: beside("instance"), truth: None }
-    }
-}
-
-impl Entry {
-    /// Adds range and instances where they lie in `truth/CONDITION/`.
-    pub(super) fn find_truth_aside(&mut self, root: &Path, stem: &str) {
-        let beside = |channel: &str| {
-            let path = root.join("truth").join(&self.condition).join(format!("{stem}.{channel}.png"));
-            path.is_file().then_some(Source::File(path))
-        };
-        (self.range, self.instance) = (beside("range"), beside("instance"));
-    }
-}
-
-/// Whether the folder holds panoramas of this layout.
-pub(super) fn holds(folder: &Path, layout: Layout) -> Result<bool> {
-    Ok(file_names(folder)?.iter().any(|name| indices(name, layout).is_some()))
-}
-
-/// The panoramas of one condition. `grid` is that of the set where it is known.
-pub(super) fn find(root: &Path, folder: &Path, condition: &str, layout: Layout, grid: Option<&GridDocument>) -> Result<Found> {
-    let fault = |message: String| Error::Parse { path: folder.to_owned(), message };
-    let mut found: BTreeMap<(usize, usize), (String, PathBuf)> = BTreeMap::new();
-    let mut mirrored = false;
-    for name in file_names(folder)? {
-        let Some((indices, is_mirrored)) = indices(&name, layout) else { continue };
-        mirrored = is_mirrored;
-        if let Some((other, _)) = found.insert(indices, (name.clone(), folder.join(&name))) {
-            return Err(fault(format!("`{other}` and `{name}` are of one place; expected one panorama each")));
+impl Indexed {
+    /// The two indices in a file's name, and whether the first of them counts backwards.
+    fn indices(&self, name: &str) -> Option<((usize, usize), bool)> {
+        let (stem, ending) = name.rsplit_once('.')?;
+        match ending {
+            "pgm" if self.is_vardy && stem.starts_with("cv_") => Some((mirrored_indices(name)?, true)),
+            "pgm" => Some((pair(stem)?, false)),
+            "png" if !self.is_vardy => Some((pair(stem)?, false)),
+            _ => None,
         }
     }
-    let ends = |of: fn(&(usize, usize)) -> usize| Some((found.keys().map(of).min()?, found.keys().map(of).max()?));
-    let (Some((i0, i1)), Some((j0, _))) = (ends(|k| k.0), ends(|k| k.1)) else {
-        return Err(fault(format!("found no panorama; expected files named {}", names_of(layout))));
-    };
-    let ((i0, i1), j0) = grid.map_or(((i0, i1), j0), |g| ((0, g.rows - 1), 0));
-    let entries = found.into_iter().map(|((i, j), (name, path))| {
-        let stem = name.rsplit_once('.').map_or(name.as_str(), |(stem, _)| stem).to_owned();
-        let mut entry = Entry::new(condition, stem.clone(), Source::File(path));
-        entry.place = Some(Place { i: if mirrored { i1 - i } else { i - i0 }, j: j - j0 });
-        entry.find_truth_aside(root, &stem);
-        entry
-    });
-    let mut entries: Vec<Entry> = entries.collect();
-    entries.sort_by_key(|e| e.place);
-    Ok(Found::new(entries))
 }
 
-/// What a person calls the files of a layout.
-fn names_of(layout: Layout) -> &'static str {
-    match layout {
-        Layout::Paper => "<i>_<j>.png or <i>_<j>.pgm",
-        _ => "<i>_<j>.pgm or cv_<i>_<j>_bw<w>.pgm",
-    }
-}
-
-/// The two indices in a file's name, and whether the first of them counts backwards.
-pub(super) fn indices(name: &str, layout: Layout) -> Option<((usize, usize), bool)> {
-    let (stem, ending) = name.rsplit_once('.')?;
+/// The indices in `cv_<x>_<y>_bw<bw>.pgm`.
+pub(super) fn mirrored_indices(name: &str) -> Option<(usize, usize)> {
     // `cv_3_4_bw0.19.pgm` has a point in its stem.
-    let pair = |text: &str| -> Option<(usize, usize)> {
-        let (i, j) = text.split_once('_')?;
-        Some((i.parse().ok()?, j.parse().ok()?))
-    };
-    match (layout, ending) {
-        (Layout::Paper, "png" | "pgm") => Some((pair(stem)?, false)),
-        (Layout::Moeller, "pgm") => Some((pair(stem.strip_prefix("cv_")?.split_once("_bw")?.0)?, true)),
-        (Layout::Vardy, "pgm") => match stem.strip_prefix("cv_") {
-            Some(rest) => Some((pair(rest.split_once("_bw")?.0)?, true)),
-            None => Some((pair(stem)?, false)),
-        },
-        _ => None,
+    pair(name.strip_suffix(".pgm")?.strip_prefix("cv_")?.split_once("_bw")?.0)
+}
+
+fn pair(text: &str) -> Option<(usize, usize)> {
+    let (i, j) = text.split_once('_')?;
+    Some((i.parse().ok()?, j.parse().ok()?))
+}
+
+impl Layout for Indexed {
+    fn about_files(&self) -> &'static str {
+        "Pictures are `CONDITION/I_J.pgm`, 8-bit grey; range and instances of each are `truth/CONDITION/I_J.range.png` and \
+         `.instance.png`."
+    }
+
+    fn is_written(&self) -> bool {
+        self.is_vardy
+    }
+
+    fn is_grey(&self) -> bool {
+        self.is_vardy
+    }
+
+    fn is_clockwise(&self) -> bool {
+        self.is_vardy
+    }
+
+    fn projection(&self, camera: Projection) -> Projection {
+        if self.is_vardy { equal_angle(camera.width, camera.height) } else { camera }
+    }
+
+    fn refuses(&self, grid: Option<&GridDocument>, one_heading: bool) -> Option<(String, &'static str)> {
+        grid_only(grid, one_heading)
+    }
+
+    fn names(&self, frame: &Frame, _set: &Document) -> Names {
+        let (condition, Place { i, j }) = (&frame.condition, frame.place.unwrap_or(Place { i: 0, j: frame.spot }));
+        Names::with_truth_aside(format!("{condition}/{i}_{j}.pgm"), condition, &format!("{i}_{j}"))
+    }
+
+    fn holds(&self, folder: &Path) -> Result<bool> {
+        Ok(file_names(folder)?.iter().any(|name| self.indices(name).is_some()))
+    }
+
+    fn find(&self, search: &Search<'_>) -> Result<Found> {
+        let fault = |message: String| Error::Parse { path: search.folder.to_owned(), message };
+        let mut found: BTreeMap<(usize, usize), PathBuf> = BTreeMap::new();
+        let mut mirrored = false;
+        for name in file_names(search.folder)? {
+            let Some((indices, is_mirrored)) = self.indices(&name) else { continue };
+            mirrored = is_mirrored;
+            if let Some(other) = found.insert(indices, search.folder.join(&name)) {
+                let other = other.file_name().unwrap_or_default().display();
+                return Err(fault(format!("`{other}` and `{name}` are of one place; expected one panorama each")));
+            }
+        }
+        let ends = |of: fn(&(usize, usize)) -> usize| Some((found.keys().map(of).min()?, found.keys().map(of).max()?));
+        let (Some((i0, i1)), Some((j0, _))) = (ends(|k| k.0), ends(|k| k.1)) else {
+            let names = if self.is_vardy { "<i>_<j>.pgm or cv_<i>_<j>_bw<w>.pgm" } else { "<i>_<j>.png or <i>_<j>.pgm" };
+            return Err(fault(format!("found no panorama; expected files named {names}")));
+        };
+        let ((i0, i1), j0) = search.grid.map_or(((i0, i1), j0), |g| ((0, i1.max(g.rows - 1)), 0));
+        let entries = found.into_iter().map(|((i, j), path)| {
+            let place = Place { i: if mirrored { i1 - i } else { i - i0 }, j: j - j0 };
+            Entry { place: Some(place), ..search.entry_with_truth_aside(path) }
+        });
+        let mut entries: Vec<Entry> = entries.collect();
+        entries.sort_by_key(|e| e.place);
+        Ok(Found::new(entries))
     }
 }

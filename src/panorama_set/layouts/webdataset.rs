@@ -4,87 +4,58 @@
 //! the first point of a member's name, which is why names of conditions have none.
 
 use std::collections::BTreeMap;
-use std::fs;
-use std::io::{Read, Write};
-use std::path::{Path, PathBuf};
+use std::io::Read;
+use std::path::Path;
 
-use super::entry::{Entry, Frame, Names, Source};
-use super::set::{Found, file_names};
 use crate::error::{Error, Result};
-use crate::storage::io_error;
+use crate::panorama_set::document::Document;
+use crate::panorama_set::entry::{Entry, Frame, Names};
+use crate::panorama_set::layout::{Found, Layout, Search};
+use crate::panorama_set::source::{Source, with_ending};
+use crate::storage::{io_error, open_within};
 
 /// Folder of the archives.
 const SHARDS: &str = "shards";
+/// Longest JSON of a sample, bytes.
+const MOST_JSON: u64 = 1 << 24;
 
-pub(super) fn names(frame: &Frame) -> Names {
-    let key = format!("{}-{:06}", frame.condition, frame.spot);
-    let file = |ending: &str| format!("{key}.{ending}");
-    Names { image: file("rgb.png"), range: file("range.png"), instance: file("instance.png"), truth: Some(file("json")) }
-}
+/// See [`super::LayoutKind::Webdataset`].
+pub(super) struct Webdataset;
 
-/// Name of the archive with the frames of a condition's part.
-#[must_use]
-pub fn shard_name(condition: &str, part: usize) -> String {
-    format!("{SHARDS}/{condition}-{part:06}.tar")
-}
-
-/// An archive that is being written.
-pub struct Shard<W: Write>(tar::Builder<W>);
-
-impl<W: Write> Shard<W> {
-    /// Begins an archive.
-    pub fn new(out: W) -> Self {
-        Self(tar::Builder::new(out))
+impl Layout for Webdataset {
+    fn about_files(&self) -> &'static str {
+        "Samples are `KEY.rgb.png`, `KEY.range.png`, `KEY.instance.png` and `KEY.json` in `shards/*.tar`."
     }
 
-    /// Appends a member.
-    ///
-    /// # Errors
-    /// When it cannot be written.
-    pub fn append(&mut self, name: &str, bytes: &[u8]) -> std::io::Result<()> {
-        let mut header = tar::Header::new_ustar();
-        header.set_size(bytes.len() as u64);
-        header.set_mode(0o644);
-        header.set_mtime(0);
-        header.set_path(name)?;
-        header.set_cksum();
-        self.0.append(&header, bytes)
+    fn samples(&self, _set: &Document) -> Vec<String> {
+        vec![format!("{SHARDS}/*.tar")]
     }
 
-    /// Ends the archive.
-    ///
-    /// # Errors
-    /// When its end cannot be written.
-    pub fn into_inner(self) -> std::io::Result<W> {
-        self.0.into_inner()
+    fn is_one_folder(&self) -> bool {
+        true
     }
-}
 
-/// The archives of a set.
-pub(super) fn shards(root: &Path) -> Result<Vec<PathBuf>> {
-    for folder in [root.join(SHARDS), root.to_owned()] {
-        if folder.is_dir() {
-            let names: Vec<_> = file_names(&folder)?.into_iter().filter(|n| n.ends_with(".tar")).collect();
-            if !names.is_empty() {
-                return Ok(names.into_iter().map(|n| folder.join(n)).collect());
-            }
+    fn names(&self, frame: &Frame, _set: &Document) -> Names {
+        Names::side_by_side(&format!("{}-{:06}", frame.condition, frame.spot))
+    }
+
+    fn archive(&self, condition: &str, part: usize) -> Option<String> {
+        Some(format!("{SHARDS}/{condition}-{part:06}.tar"))
+    }
+
+    fn holds(&self, folder: &Path) -> Result<bool> {
+        Ok(!with_ending(folder, SHARDS, ".tar")?.is_empty())
+    }
+
+    fn find(&self, search: &Search<'_>) -> Result<Found> {
+        let shards = with_ending(search.root, SHARDS, ".tar")?;
+        if shards.is_empty() {
+            let message = format!("found no archive; expected *.tar in it or in {SHARDS}");
+            return Err(Error::Parse { path: search.root.to_owned(), message });
         }
+        let entries = shards.iter().map(|path| samples(search.root, path)).collect::<Result<Vec<_>>>()?;
+        Ok(Found::new(entries.into_iter().flatten().collect()))
     }
-    Ok(Vec::new())
-}
-
-/// All samples of a set's archives, in their order.
-pub(super) fn find(root: &Path) -> Result<Found> {
-    let shards = shards(root)?;
-    if shards.is_empty() {
-        let message = format!("found no archive; expected *.tar in it or in {SHARDS}");
-        return Err(Error::Parse { path: root.to_owned(), message });
-    }
-    let mut entries = Vec::new();
-    for path in shards {
-        entries.extend(samples(&path)?);
-    }
-    Ok(Found::new(entries))
 }
 
 /// Members of a sample by what follows the key.
@@ -94,10 +65,9 @@ struct Sample {
     json: Option<Vec<u8>>,
 }
 
-fn samples(path: &Path) -> Result<Vec<Entry>> {
+fn samples(root: &Path, path: &Path) -> Result<Vec<Entry>> {
     let broken = io_error("read archive", path);
-    let file = fs::File::open(path).map_err(&broken)?;
-    let length = file.metadata().map_err(&broken)?.len();
+    let (file, length) = open_within(root, path)?;
     let mut archive = tar::Archive::new(file);
     let mut samples: Vec<(String, Sample)> = Vec::new();
     for member in archive.entries_with_seek().map_err(&broken)? {
@@ -107,7 +77,7 @@ fn samples(path: &Path) -> Result<Vec<Entry>> {
         let Some((stem, ending)) = base.split_once('.') else { continue };
         let key = if folder.is_empty() { stem.to_owned() } else { format!("{folder}/{stem}") };
         let (offset, bytes) = (member.raw_file_position(), member.size());
-        if offset + bytes > length {
+        if offset.checked_add(bytes).is_none_or(|end| end > length) {
             let message = format!("`{name}` reaches beyond the end of the archive, which is cut off at {length} bytes");
             return Err(Error::Parse { path: path.to_owned(), message });
         }
@@ -117,7 +87,7 @@ fn samples(path: &Path) -> Result<Vec<Entry>> {
         let Some((_, sample)) = samples.last_mut() else { continue };
         if ending == "json" {
             let mut text = Vec::new();
-            member.read_to_end(&mut text).map_err(&broken)?;
+            member.by_ref().take(MOST_JSON).read_to_end(&mut text).map_err(&broken)?;
             sample.json = Some(text);
         }
         sample.members.insert(ending.to_owned(), Source::Member { archive: path.to_owned(), name, offset, bytes });

@@ -16,7 +16,7 @@ use crate::error::{Error, Result};
 use crate::estimation::paper::PaperSettings;
 use crate::geometry::Pose;
 use crate::panorama::Panorama;
-use crate::panorama_set::{Grid, Layout, PanoramaSet, Place};
+use crate::panorama_set::{Grid, LayoutKind, PanoramaSet, Place};
 use crate::render::{CpuRenderer, Renderer, Scene, View};
 use crate::vision::ExtractorSettings;
 use crate::world::World;
@@ -54,10 +54,10 @@ impl ImageSet {
 
     /// The layout of such a set on disk.
     #[must_use]
-    pub fn layout(self) -> Layout {
+    pub fn layout(self) -> LayoutKind {
         match self {
-            Self::Paper => Layout::Paper,
-            Self::Vardy => Layout::Vardy,
+            Self::Paper => LayoutKind::Paper,
+            Self::Vardy => LayoutKind::Vardy,
         }
     }
 

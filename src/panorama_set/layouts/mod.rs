@@ -1,0 +1,65 @@
+//! The list of layouts. A new one is a file here, a line of [`LayoutKind`] and one of [`LayoutKind::layout`].
+
+mod folder;
+mod image_database;
+mod moeller;
+mod vardy;
+mod webdataset;
+
+use serde::{Deserialize, Serialize};
+use strum::{EnumMessage, EnumString, IntoStaticStr, VariantArray};
+
+use super::layout::Layout;
+
+/// The layouts, in the order in which a folder is tried. The first line of each is the command line's help.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, EnumMessage, EnumString, IntoStaticStr, VariantArray)]
+#[serde(rename_all = "kebab-case")]
+#[strum(serialize_all = "kebab-case")]
+pub enum LayoutKind {
+    /// BrainsOnBoard: database_entries.csv, database_metadata.yaml, PNG.
+    ImageDatabase,
+    /// Moeller's: a .db line about the grid, and folders with cv_X_Y_bwBW.pgm, grey, clockwise.
+    Moeller,
+    /// Tar shards for training with `webdataset`.
+    Webdataset,
+    /// Vardy's panoramic image database: CONDITION/I_J.pgm, grey, clockwise.
+    ///
+    /// Also `cv_<rows-1-i>_<j>_bw<bw>.pgm`.
+    Vardy,
+    /// The paper's own set, read only: `<i>_<j>.png` or `.pgm`.
+    Paper,
+    /// A folder a condition; colours, range, instances and truth of each frame.
+    Folder,
+}
+
+impl LayoutKind {
+    /// The layout itself.
+    #[must_use]
+    pub fn layout(self) -> &'static dyn Layout {
+        match self {
+            Self::ImageDatabase => &image_database::ImageDatabase,
+            Self::Moeller => &moeller::Moeller,
+            Self::Webdataset => &webdataset::Webdataset,
+            Self::Vardy => &vardy::VARDY,
+            Self::Paper => &vardy::PAPER,
+            Self::Folder => &folder::Folder,
+        }
+    }
+
+    /// Those in which sets are written.
+    pub fn written() -> impl Iterator<Item = Self> {
+        Self::VARIANTS.iter().copied().filter(|kind| kind.layout().is_written())
+    }
+
+    /// What files and the command line call it.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        self.into()
+    }
+
+    /// Their names, for messages.
+    #[must_use]
+    pub fn names() -> String {
+        Self::VARIANTS.iter().map(|kind| kind.name()).collect::<Vec<_>>().join(", ")
+    }
+}
