@@ -8,7 +8,6 @@ use anyhow::{Result, bail};
 use serde::Serialize;
 use wayhome::Error;
 use wayhome::episode::{Look, Outcome, Progress, Recorder, Setup, Simulation, Summary};
-use wayhome::record::Recordings;
 use wayhome::record::run::RunFiles;
 use wayhome::report::{seeds as seeds_report, text};
 use wayhome::sensor::Noise;
@@ -80,11 +79,15 @@ fn verdict(summary: &Summary) -> Verdict {
 fn single(args: &HomeArgs, context: &Context, world: &World, setup: &Setup, seed: u64, out: &Path) -> Result<Summary> {
     setup.check()?;
     setup.start_pose(world, wayhome::random::Seed(seed))?; // before a folder is made for a run that cannot start
-    let paths = args.recordings.paths();
-    paths.check(out)?;
+    let recordings = args.recordings.recordings();
+    recordings.iter().try_for_each(|(format, path)| format.check(path, out))?;
     let files = RunFiles::open(out, "home", world)?;
     let mut simulation = Simulation::new(world, setup)?;
-    let recorders: Vec<Box<dyn Recorder>> = vec![Box::new(Recordings::open(world, &paths)?), Box::new(files)];
+    let mut recorders: Vec<Box<dyn Recorder>> = Vec::new();
+    for (format, path) in recordings {
+        recorders.push(format.open(&path, world)?);
+    }
+    recorders.push(Box::new(files));
     simulation.record_to(recorders);
     let bar = context.progress(None)?;
     let mut watch = |progress: &Progress| {

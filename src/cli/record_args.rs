@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use wayhome::record::RecordingPaths;
+use wayhome::record::{Format, Recordings};
 
 /// Files that grow while a run goes on.
 #[derive(Debug, Clone, clap::Args)]
@@ -16,9 +16,10 @@ pub struct RecordArgs {
 }
 
 impl RecordArgs {
-    /// Where to record to.
-    pub fn paths(&self) -> RecordingPaths {
-        RecordingPaths { mcap: self.record.clone(), video: self.video.clone() }
+    /// What to record, and where to.
+    pub fn recordings(&self) -> Recordings {
+        let asked = [(Format::Mcap, &self.record), (Format::Gif, &self.video)];
+        asked.into_iter().filter_map(|(format, path)| Some((format, path.clone()?))).collect()
     }
 }
 

@@ -1,5 +1,6 @@
 //! The files of one open-loop drive.
 
+use super::columns::{self, Columns, number};
 use crate::draw::map::{MapDrawing, PathStyle};
 use crate::episode::open_loop::{DriveStep, DriveSummary};
 use crate::error::Result;
@@ -13,41 +14,46 @@ pub const FILES: &[&str] = &["summary.json", "drive.csv", "collisions.csv", "pat
 
 /// Columns of `drive.csv`. Slip, forces and loads are means over the interval that ends at the row's time, in the robot's frame;
 /// everything else is as of that time.
-const COLUMNS: [&str; 33] = [
-    "t_s",
-    "v_cmd_m_s",
-    "omega_cmd_rad_s",
-    "x_m",
-    "y_m",
-    "heading_rad",
-    "v_forward_m_s",
-    "v_leftward_m_s",
-    "yaw_rate_rad_s",
-    "x_odom_m",
-    "y_odom_m",
-    "heading_odom_rad",
-    "v_odom_m_s",
-    "omega_odom_rad_s",
-    "wheel_left_rad_s",
-    "wheel_right_rad_s",
-    "slip_left_forward_m_s",
-    "slip_left_leftward_m_s",
-    "slip_right_forward_m_s",
-    "slip_right_leftward_m_s",
-    "force_left_forward_n",
-    "force_left_leftward_n",
-    "force_right_forward_n",
-    "force_right_leftward_n",
-    "force_caster_forward_n",
-    "force_caster_leftward_n",
-    "load_left_n",
-    "load_right_n",
-    "load_caster_n",
-    "collisions",
-    "odometry_error_x_m",
-    "odometry_error_y_m",
-    "odometry_error_m",
+const COLUMNS: &Columns<DriveStep> = &[
+    ("t_s", |s| number(s.time_s)),
+    ("v_cmd_m_s", |s| number(s.command.v)),
+    ("omega_cmd_rad_s", |s| number(s.command.omega)),
+    ("x_m", |s| number(s.truth.x)),
+    ("y_m", |s| number(s.truth.y)),
+    ("heading_rad", |s| number(s.truth.heading)),
+    ("v_forward_m_s", |s| number(s.wheels.velocity_m_s.x)),
+    ("v_leftward_m_s", |s| number(s.wheels.velocity_m_s.y)),
+    ("yaw_rate_rad_s", |s| number(s.wheels.yaw_rate_rad_s)),
+    ("x_odom_m", |s| number(s.dead_reckoned.x)),
+    ("y_odom_m", |s| number(s.dead_reckoned.y)),
+    ("heading_odom_rad", |s| number(s.dead_reckoned.heading)),
+    ("v_odom_m_s", |s| number(s.odometry.v)),
+    ("omega_odom_rad_s", |s| number(s.odometry.omega)),
+    ("wheel_left_rad_s", |s| number(s.wheels.wheel_speeds_rad_s[0])),
+    ("wheel_right_rad_s", |s| number(s.wheels.wheel_speeds_rad_s[1])),
+    ("slip_left_forward_m_s", |s| number(s.wheels.floor.slip_m_s[0].x)),
+    ("slip_left_leftward_m_s", |s| number(s.wheels.floor.slip_m_s[0].y)),
+    ("slip_right_forward_m_s", |s| number(s.wheels.floor.slip_m_s[1].x)),
+    ("slip_right_leftward_m_s", |s| number(s.wheels.floor.slip_m_s[1].y)),
+    ("force_left_forward_n", |s| number(s.wheels.floor.force_n[0].x)),
+    ("force_left_leftward_n", |s| number(s.wheels.floor.force_n[0].y)),
+    ("force_right_forward_n", |s| number(s.wheels.floor.force_n[1].x)),
+    ("force_right_leftward_n", |s| number(s.wheels.floor.force_n[1].y)),
+    ("force_caster_forward_n", |s| number(s.wheels.floor.force_n[2].x)),
+    ("force_caster_leftward_n", |s| number(s.wheels.floor.force_n[2].y)),
+    ("load_left_n", |s| number(s.wheels.floor.load_n[0])),
+    ("load_right_n", |s| number(s.wheels.floor.load_n[1])),
+    ("load_caster_n", |s| number(s.wheels.floor.load_n[2])),
+    ("collisions", |s| number(f64::from(s.collisions))),
+    ("odometry_error_x_m", |s| number(error(s).x)),
+    ("odometry_error_y_m", |s| number(error(s).y)),
+    ("odometry_error_m", |s| number(error(s).norm())),
 ];
+
+/// How far odometry is off.
+fn error(step: &DriveStep) -> Vector2<f64> {
+    step.dead_reckoned.position() - step.truth.position()
+}
 
 /// The files of a drive under way: rows go to disk as they come, and of the paths only what a drawing can show is kept.
 pub struct DriveFiles<'a> {
@@ -68,7 +74,7 @@ impl<'a> DriveFiles<'a> {
     /// When a file cannot be created.
     pub fn begin(folder: OutputFolder, world: &'a World) -> Result<Self> {
         let mut rows = folder.begin("drive.csv")?;
-        rows.append(&format!("{}\n", COLUMNS.join(",")))?;
+        rows.append(&columns::header(COLUMNS))?;
         let mut collisions = folder.begin("collisions.csv")?;
         collisions.append("t_s,with,impulse_n_s\n")?;
         Ok(Self { folder, world, rows, collisions, truth: Trail::default(), odometry: Trail::default(), ends: None })
@@ -79,7 +85,7 @@ impl<'a> DriveFiles<'a> {
     /// # Errors
     /// When a file cannot be written.
     pub fn add(&mut self, step: &DriveStep, collisions: &[Collision]) -> Result<()> {
-        self.rows.append(&format!("{}\n", row(step).map(|value| value.to_string()).join(",")))?;
+        self.rows.append(&columns::row(COLUMNS, step))?;
         for hit in collisions {
             let with = hit.with.name(self.world).replace(['"', ',', '\n', '\r'], " ");
             self.collisions.append(&format!("{},{with},{}\n", hit.time_s, hit.impulse_n_s))?;
@@ -154,49 +160,6 @@ impl Trail {
         let end = self.last.filter(|last| self.kept.last() != Some(last));
         self.kept.iter().copied().chain(end)
     }
-}
-
-/// The numbers of one state in the order of [`COLUMNS`].
-fn row(step: &DriveStep) -> [f64; 33] {
-    let s = step;
-    let [slip_left, slip_right] = s.wheels.floor.slip_m_s;
-    let [left, right, caster] = s.wheels.floor.force_n;
-    let error = s.dead_reckoned.position() - s.truth.position();
-    [
-        s.time_s,
-        s.command.v,
-        s.command.omega,
-        s.truth.x,
-        s.truth.y,
-        s.truth.heading,
-        s.wheels.velocity_m_s.x,
-        s.wheels.velocity_m_s.y,
-        s.wheels.yaw_rate_rad_s,
-        s.dead_reckoned.x,
-        s.dead_reckoned.y,
-        s.dead_reckoned.heading,
-        s.odometry.v,
-        s.odometry.omega,
-        s.wheels.wheel_speeds_rad_s[0],
-        s.wheels.wheel_speeds_rad_s[1],
-        slip_left.x,
-        slip_left.y,
-        slip_right.x,
-        slip_right.y,
-        left.x,
-        left.y,
-        right.x,
-        right.y,
-        caster.x,
-        caster.y,
-        s.wheels.floor.load_n[0],
-        s.wheels.floor.load_n[1],
-        s.wheels.floor.load_n[2],
-        f64::from(s.collisions),
-        error.x,
-        error.y,
-        error.norm(),
-    ]
 }
 
 #[cfg(test)]

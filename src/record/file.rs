@@ -1,11 +1,11 @@
-//! A file that is written piece by piece and appears only when it is whole.
+//! The file of a recording: it takes the place of older recordings and of nothing else.
 
 use std::fs::{self, File};
-use std::io::{self, BufWriter, Read, Seek, SeekFrom, Write};
-use std::path::{Path, PathBuf};
+use std::io::{self, Read};
+use std::path::Path;
 
 use crate::error::{Error, Result};
-use crate::storage::{io_error, partial_name};
+use crate::storage::{PartialFile, io_error};
 
 /// What every recording holds near its beginning, so that a later one knows that it may take its place.
 pub(super) const MAKER: &str = "wayhome";
@@ -46,69 +46,19 @@ pub(super) fn check(path: &Path, kind: &Kind) -> Result<()> {
     if ours { Ok(()) } else { Err(taken()) }
 }
 
-/// A recording on its way to disk. Dropped before [`RecordingFile::complete`] it leaves nothing.
-#[derive(Debug)]
-pub(super) struct RecordingFile {
-    path: PathBuf,
-    partial: PathBuf,
-    writer: BufWriter<File>,
-    written: u64,
-}
-
-impl RecordingFile {
-    /// Begins the file under another name.
-    ///
-    /// # Errors
-    /// As [`check`], and when the file cannot be created.
-    pub(super) fn create(path: &Path, kind: &Kind) -> Result<Self> {
-        check(path, kind)?;
-        let partial = partial_name(path);
-        let file = File::create(&partial).map_err(io_error("write", path))?;
-        Ok(Self { path: path.to_owned(), partial, writer: BufWriter::new(file), written: 0 })
-    }
-
-    /// Bytes written so far.
-    pub(super) fn written(&self) -> u64 {
-        self.written
-    }
-
-    /// Gives the file its name.
-    ///
-    /// # Errors
-    /// When what is left of it cannot be written.
-    pub(super) fn complete(mut self) -> Result<()> {
-        let done = self.writer.flush().and_then(|()| fs::rename(&self.partial, &self.path));
-        done.map_err(io_error("write", &self.path))
-    }
-}
-
-impl Write for RecordingFile {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        let count = self.writer.write(bytes)?;
-        self.written += count as u64;
-        Ok(count)
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        self.writer.flush()
-    }
-}
-
-impl Seek for RecordingFile {
-    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
-        self.writer.seek(to)
-    }
-}
-
-impl Drop for RecordingFile {
-    fn drop(&mut self) {
-        // Best effort, and nothing to do once it is complete: the next recording of that name would take its place.
-        let _ = fs::remove_file(&self.partial);
-    }
+/// Begins a recording under another name.
+///
+/// # Errors
+/// As [`check`], and when the file cannot be created.
+pub(super) fn create(path: &Path, kind: &Kind) -> Result<PartialFile> {
+    check(path, kind)?;
+    PartialFile::create(path)
 }
 
 #[cfg(test)]
 mod tests {
+    use std::io::Write;
+
     use super::*;
 
     const KIND: Kind = Kind { magic: b"GIF89a" };
@@ -117,18 +67,18 @@ mod tests {
     fn only_older_recordings_are_replaced() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("run.gif");
-        let mut file = RecordingFile::create(&path, &KIND).unwrap();
+        let mut file = create(&path, &KIND).unwrap();
         file.write_all(b"GIF89a by wayhome").unwrap();
         assert!(!path.exists(), "not before it is whole");
         file.complete().unwrap();
-        let mut second = RecordingFile::create(&path, &KIND).unwrap();
+        let mut second = create(&path, &KIND).unwrap();
         second.write_all(b"half").unwrap();
         drop(second);
         assert_eq!(fs::read(&path).unwrap(), b"GIF89a by wayhome");
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1, "nothing half written stays");
         for foreign in [&b"GIF89a by somebody"[..], b"by wayhome", b""] {
             fs::write(&path, foreign).unwrap();
-            assert!(matches!(RecordingFile::create(&path, &KIND), Err(Error::FileTaken { .. })));
+            assert!(matches!(create(&path, &KIND), Err(Error::FileTaken { .. })));
         }
         assert!(matches!(check(folder.path(), &KIND), Err(Error::FileTaken { .. })));
         let nowhere = check(&folder.path().join("no/run.gif"), &KIND).unwrap_err().to_string();

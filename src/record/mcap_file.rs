@@ -17,14 +17,15 @@ use mcap::{McapError, WriteOptions, Writer};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::file::{Kind, MAKER, RecordingFile};
+use super::file::{self, Kind, MAKER};
 use super::messages::{self, Command, Diagnostics, nanoseconds, timestamp, turn, vector};
 use super::scene;
-use crate::episode::{Belief, CollisionRecord, Moment, Summary};
+use crate::episode::{Belief, CollisionRecord, Moment, Record, Recorder, Summary};
 use crate::error::{Error, Result};
 use crate::geometry::Pose;
 use crate::observation::{HomeSnapshot, LandmarkId};
 use crate::panorama::Panorama;
+use crate::storage::PartialFile;
 use crate::world::World;
 
 pub(super) const KIND: Kind = Kind { magic: b"\x89MCAP0\r\n" };
@@ -35,7 +36,8 @@ const JPEG_QUALITY: u8 = 90;
 /// A growing MCAP file.
 pub(super) struct McapRecording<'a> {
     world: &'a World,
-    tape: Tape,
+    /// Until the run has ended.
+    tape: Option<Tape>,
     home_ids: Vec<LandmarkId>,
     bodies: Vec<Pose>,
     /// True pose at the first step.
@@ -48,10 +50,13 @@ impl<'a> McapRecording<'a> {
     pub(super) fn create(world: &'a World, path: &Path) -> Result<Self> {
         let tape = Tape::create(path)?;
         let bodies = world.body_poses();
-        Ok(Self { world, tape, home_ids: Vec::new(), bodies, start: None, believed: false, last_ns: 0 })
+        Ok(Self { world, tape: Some(tape), home_ids: Vec::new(), bodies, start: None, believed: false, last_ns: 0 })
     }
+}
 
-    pub(super) fn begin(&mut self, home: &HomeSnapshot, panorama: Option<&Panorama>) -> Result<()> {
+impl Recorder for McapRecording<'_> {
+    fn begin(&mut self, home: &HomeSnapshot, panorama: Option<&Panorama>) -> Result<()> {
+        let Some(tape) = &mut self.tape else { return Ok(()) };
         self.home_ids = home.bearings.iter().map(|b| b.id).collect();
         self.home_ids.sort_unstable();
         let camera = self.world.camera_pose(&Pose::IDENTITY);
@@ -59,39 +64,40 @@ impl<'a> McapRecording<'a> {
             transform(0, "map", "home", &self.world.home, 0.0),
             transform(0, "base_link", "camera", &camera, self.world.spec.camera.height_m),
         ];
-        self.tape.put("/tf", 0, &FrameTransforms { transforms: fixed.to_vec() })?;
-        self.tape.put("/room", 0, &scene::room(self.world))?;
-        self.tape.put("/home/bearings", 0, &scene::bearings(&home.bearings, |_| true, 0))?;
+        tape.put("/tf", 0, &FrameTransforms { transforms: fixed.to_vec() })?;
+        tape.put("/room", 0, &scene::room(self.world))?;
+        tape.put("/home/bearings", 0, &scene::bearings(&home.bearings, |_| true, 0))?;
         if let Some(panorama) = panorama {
-            self.tape.put("/home/panorama", 0, &picture(panorama, 0)?)?;
+            tape.put("/home/panorama", 0, &picture(panorama, 0)?)?;
         }
         Ok(())
     }
 
-    pub(super) fn record(&mut self, moment: &Moment<'_>) -> Result<()> {
+    fn record(&mut self, moment: &Moment<'_>) -> Result<()> {
+        let Some(tape) = &mut self.tape else { return Ok(()) };
         let step = moment.step;
         let time_ns = nanoseconds(step.time_s);
         self.last_ns = time_ns;
         for hit in CollisionRecord::list(moment.collisions, self.world) {
             let message = format!("hit {} at {:.3} s with {:.3} N s", hit.with, hit.time_s, hit.impulse_n_s);
-            self.tape.put("/log", time_ns, &line(time_ns, log::Level::Warning, message))?;
+            tape.put("/log", time_ns, &line(time_ns, log::Level::Warning, message))?;
         }
         let start = *self.start.get_or_insert(step.truth);
         let in_odom = start.to_local(&step.dead_reckoned);
         let map_to_odom = step.truth.compose(&in_odom.to_local(&Pose::IDENTITY));
         let transforms =
             vec![transform(time_ns, "map", "odom", &map_to_odom, 0.0), transform(time_ns, "odom", "base_link", &in_odom, 0.0)];
-        self.tape.put("/tf", time_ns, &FrameTransforms { transforms })?;
-        self.tape.put("/truth", time_ns, &in_frame(time_ns, "map", messages::pose(&step.truth, 0.0)))?;
-        self.tape.put("/odometry", time_ns, &messages::odometry(time_ns, "odom", &in_odom, step.odometry))?;
+        tape.put("/tf", time_ns, &FrameTransforms { transforms })?;
+        tape.put("/truth", time_ns, &in_frame(time_ns, "map", messages::pose(&step.truth, 0.0)))?;
+        tape.put("/odometry", time_ns, &messages::odometry(time_ns, "odom", &in_odom, step.odometry))?;
         if let Some(estimate) = &step.estimate {
-            self.tape.put("/estimate", time_ns, &messages::estimate(time_ns, estimate))?;
+            tape.put("/estimate", time_ns, &messages::estimate(time_ns, estimate))?;
             let pose = messages::pose(&estimate.pose, 0.0);
-            self.tape.put("/estimate/pose", time_ns, &in_frame(time_ns, "home", pose))?;
+            tape.put("/estimate/pose", time_ns, &in_frame(time_ns, "home", pose))?;
         }
         // An estimate that is gone is taken off the scene once.
         if step.estimate.is_some() || self.believed {
-            self.tape.put("/estimate/ellipse", time_ns, &scene::ellipse(step.estimate.as_ref(), time_ns))?;
+            tape.put("/estimate/ellipse", time_ns, &scene::ellipse(step.estimate.as_ref(), time_ns))?;
         }
         let ever = self.believed || step.estimate.is_some();
         let belief = match (step.estimate.is_some(), ever) {
@@ -103,27 +109,28 @@ impl<'a> McapRecording<'a> {
         self.believed = ever;
         if step.seen.is_some() {
             let is_home = |b: &crate::observation::Bearing| self.home_ids.binary_search(&b.id).is_ok();
-            self.tape.put("/bearings", time_ns, &scene::bearings(moment.bearings, is_home, time_ns))?;
+            tape.put("/bearings", time_ns, &scene::bearings(moment.bearings, is_home, time_ns))?;
         }
         if let Some(panorama) = moment.panorama {
-            self.tape.put("/panorama", time_ns, &picture(panorama, time_ns)?)?;
+            tape.put("/panorama", time_ns, &picture(panorama, time_ns)?)?;
         }
         if let Some(update) = scene::moved(self.world, &self.bodies, moment.bodies, time_ns) {
-            self.tape.put("/room", time_ns, &update)?;
+            tape.put("/room", time_ns, &update)?;
             self.bodies.copy_from_slice(moment.bodies);
         }
         let command = Command { v_m_s: step.command.v, omega_rad_s: step.command.omega };
-        self.tape.put_json("/command", time_ns, &command)?;
-        self.tape.put_json("/diagnostics", time_ns, &Diagnostics::new(step, &self.world.home, belief))
+        tape.put_json("/command", time_ns, &command)?;
+        tape.put_json("/diagnostics", time_ns, &Diagnostics::new(step, &self.world.home, belief))
     }
 
-    pub(super) fn finish(mut self, summary: &Summary) -> Result<()> {
+    fn finish(&mut self, _record: &Record, summary: &Summary) -> Result<()> {
+        let Some(mut tape) = self.tape.take() else { return Ok(()) };
         let distance_cm = 100.0 * summary.final_distance_m;
         let mut message = format!("{}: {distance_cm:.1} cm from home", summary.outcome.name());
         if let Some(failure) = &summary.failure {
             message = format!("{message}; {failure}");
         }
-        self.tape.put("/log", self.last_ns, &line(self.last_ns, log::Level::Info, message))?;
+        tape.put("/log", self.last_ns, &line(self.last_ns, log::Level::Info, message))?;
         let facts = [
             ("world", summary.world.clone()),
             ("world_sha256", summary.world_sha256.clone()),
@@ -131,8 +138,8 @@ impl<'a> McapRecording<'a> {
             ("method", summary.setup.method.to_string()),
             ("version", summary.version.to_owned()),
         ];
-        self.tape.note("run", facts.into_iter().map(|(name, value)| (name.to_owned(), value)).collect())?;
-        self.tape.complete()
+        tape.note("run", facts.into_iter().map(|(name, value)| (name.to_owned(), value)).collect())?;
+        tape.complete()
     }
 }
 
@@ -172,7 +179,7 @@ fn picture(panorama: &Panorama, time_ns: u64) -> Result<CompressedImage> {
 /// The file with its channels; each is opened with its first message.
 struct Tape {
     path: PathBuf,
-    writer: Writer<RecordingFile>,
+    writer: Writer<PartialFile>,
     /// Channel and number of the next message, by topic.
     channels: BTreeMap<&'static str, (u16, u32)>,
     buffer: Vec<u8>,
@@ -180,7 +187,7 @@ struct Tape {
 
 impl Tape {
     fn create(path: &Path) -> Result<Self> {
-        let file = RecordingFile::create(path, &KIND)?;
+        let file = file::create(path, &KIND)?;
         let writer = WriteOptions::new().library(MAKER).create(file).map_err(|e| fault(path, e))?;
         Ok(Self { path: path.to_owned(), writer, channels: BTreeMap::new(), buffer: Vec::new() })
     }

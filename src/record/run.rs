@@ -2,11 +2,13 @@
 
 use std::path::Path;
 
+use super::columns::{self, Columns, number};
 use super::path_plot::path_svg;
 use super::tum;
 use crate::draw::image::colours_png;
 use crate::episode::{Belief, Record, Recorder, Step, Summary};
 use crate::error::Result;
+use crate::observation::Estimate;
 use crate::storage::{OutputFolder, json};
 use crate::world::World;
 
@@ -23,28 +25,28 @@ const FILES: &[&str] = &[
     "panorama_end.png",
 ];
 
-/// Columns of `trajectory.csv`.
-const COLUMNS: [&str; 20] = [
-    "t_s",
-    "x_m",
-    "y_m",
-    "heading_rad",
-    "v_cmd",
-    "omega_cmd",
-    "v_odom",
-    "omega_odom",
-    "slip_left",
-    "slip_right",
-    "range_est_m",
-    "bearing_est_rad",
-    "heading_est_rad",
-    "range_sd_m",
-    "bearing_sd_rad",
-    "heading_sd_rad",
-    "matched",
-    "rejected",
-    "nis",
-    "belief",
+/// Columns of `trajectory.csv`, of a step and of what its method believes to be about.
+const COLUMNS: &Columns<(Step, Option<Belief>)> = &[
+    ("t_s", |(s, _)| number(s.time_s)),
+    ("x_m", |(s, _)| number(s.truth.x)),
+    ("y_m", |(s, _)| number(s.truth.y)),
+    ("heading_rad", |(s, _)| number(s.truth.heading)),
+    ("v_cmd", |(s, _)| number(s.command.v)),
+    ("omega_cmd", |(s, _)| number(s.command.omega)),
+    ("v_odom", |(s, _)| number(s.odometry.v)),
+    ("omega_odom", |(s, _)| number(s.odometry.omega)),
+    ("slip_left", |(s, _)| number(s.slip_m_s[0])),
+    ("slip_right", |(s, _)| number(s.slip_m_s[1])),
+    ("range_est_m", |(s, _)| number(s.estimate.as_ref().map(Estimate::range_m))),
+    ("bearing_est_rad", |(s, _)| number(s.estimate.as_ref().map(Estimate::bearing_rad))),
+    ("heading_est_rad", |(s, _)| number(s.estimate.as_ref().map(|e| e.pose.heading))),
+    ("range_sd_m", |(s, _)| number(s.estimate.as_ref().map(Estimate::range_sd_m))),
+    ("bearing_sd_rad", |(s, _)| number(s.estimate.as_ref().map(Estimate::bearing_sd_rad))),
+    ("heading_sd_rad", |(s, _)| number(s.estimate.as_ref().map(Estimate::heading_sd_rad))),
+    ("matched", |(s, _)| number(s.seen.map(|_| s.matched as f64))),
+    ("rejected", |(s, _)| number(s.seen.map(|_| s.rejected as f64))),
+    ("nis", |(s, _)| number(s.nis)),
+    ("belief", |(_, belief)| belief.map_or_else(String::new, |belief| belief.name().to_owned())),
 ];
 
 /// Writes all files of a run into a folder when it has ended.
@@ -88,45 +90,9 @@ fn write(mut folder: OutputFolder, world: &World, record: &Record, summary: &Sum
     folder.finish()
 }
 
-/// One row a control step, empty cells where there is no number. Numbers have as many digits as it takes to read them back
-/// without loss.
+/// One row a control step, empty cells where there is no number.
 #[must_use]
 pub fn trajectory_csv(steps: &[Step]) -> String {
-    let mut text = COLUMNS.join(",");
-    text.push('\n');
-    for (step, belief) in steps.iter().zip(Belief::of_steps(steps)) {
-        let cells = row(step).map(|value| value.filter(|v| v.is_finite()).map_or_else(String::new, |v| v.to_string()));
-        text.push_str(&cells.join(","));
-        text.push(',');
-        text.push_str(belief.map_or("", Belief::name));
-        text.push('\n');
-    }
-    text
-}
-
-/// The numbers of one step in the order of [`COLUMNS`], all but the last.
-fn row(step: &Step) -> [Option<f64>; 19] {
-    let estimate = step.estimate.as_ref();
-    let observed = |count: usize| step.seen.map(|_| count as f64);
-    [
-        Some(step.time_s),
-        Some(step.truth.x),
-        Some(step.truth.y),
-        Some(step.truth.heading),
-        Some(step.command.v),
-        Some(step.command.omega),
-        Some(step.odometry.v),
-        Some(step.odometry.omega),
-        Some(step.slip_m_s[0]),
-        Some(step.slip_m_s[1]),
-        estimate.map(|e| e.range_m()),
-        estimate.map(|e| e.bearing_rad()),
-        estimate.map(|e| e.pose.heading),
-        estimate.map(|e| e.range_sd_m()),
-        estimate.map(|e| e.bearing_sd_rad()),
-        estimate.map(|e| e.heading_sd_rad()),
-        observed(step.matched),
-        observed(step.rejected),
-        Some(step.nis),
-    ]
+    let rows = steps.iter().copied().zip(Belief::of_steps(steps)).map(|of| columns::row(COLUMNS, &of));
+    std::iter::once(columns::header(COLUMNS)).chain(rows).collect()
 }

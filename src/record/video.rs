@@ -13,14 +13,15 @@ use gif::{AnyExtension, DisposalMethod, Encoder, EncodingError, Extension, Frame
 use image::imageops::FilterType;
 use image::{Rgb, RgbImage};
 
-use super::file::{Kind, MAKER, RecordingFile};
+use super::file::{self, Kind, MAKER};
 use super::raster::{RoomRaster, Sight};
-use crate::episode::Moment;
+use crate::episode::{Moment, Record, Recorder, Summary};
 use crate::error::{Error, Result};
 use crate::geometry::Pose;
 use crate::observation::HomeSnapshot;
 use crate::panorama::Panorama;
 use crate::record::path_plot::in_room;
+use crate::storage::PartialFile;
 use crate::world::World;
 
 pub(super) const KIND: Kind = Kind { magic: b"GIF89a" };
@@ -44,7 +45,7 @@ pub(super) struct VideoRecording<'a> {
     world: &'a World,
     path: PathBuf,
     room: RoomRaster<'a>,
-    file: Option<RecordingFile>,
+    file: Option<PartialFile>,
     film: Option<Film>,
     truth: Vec<Pose>,
     estimate: Vec<Pose>,
@@ -58,7 +59,7 @@ pub(super) struct VideoRecording<'a> {
 
 impl<'a> VideoRecording<'a> {
     pub(super) fn create(world: &'a World, path: &Path) -> Result<Self> {
-        let file = RecordingFile::create(path, &KIND)?;
+        let file = file::create(path, &KIND)?;
         let pixels = 4 * (WIDTH_PX as usize) * (ROOM_PX as usize);
         let room = RoomRaster::new(world, WIDTH_PX, ROOM_PX).ok_or(Error::Memory { bytes: pixels })?;
         Ok(Self {
@@ -74,44 +75,6 @@ impl<'a> VideoRecording<'a> {
             next_s: 0.0,
             pending: None,
         })
-    }
-
-    pub(super) fn begin(&mut self, _home: &HomeSnapshot, panorama: Option<&Panorama>) -> Result<()> {
-        // So that the picture has room for one from the first frame on.
-        self.panorama = panorama.and_then(strip);
-        Ok(())
-    }
-
-    pub(super) fn record(&mut self, moment: &Moment<'_>) -> Result<()> {
-        let step = moment.step;
-        self.truth.push(step.truth);
-        let nowhere = Pose { x: f64::NAN, ..Pose::IDENTITY };
-        self.estimate.push(step.estimate.as_ref().map_or(nowhere, |e| self.world.home.compose(&e.pose)));
-        let due = step.time_s >= self.next_s - 1e-9;
-        if due && let Some(panorama) = moment.panorama {
-            self.panorama = strip(panorama);
-        }
-        // Those that are not due are drawn as well once the robot only comes to rest: the last of them ends the film.
-        if !due && step.seen.is_some() {
-            return Ok(());
-        }
-        let covariance = step.estimate.as_ref().map(|e| in_room(&self.world.home, e));
-        let sight = Sight { truth: &self.truth, estimate: &self.estimate, covariance, bodies: moment.bodies };
-        let picture = self.compose(&sight);
-        if !due {
-            self.pending = Some((step.time_s, picture));
-            return Ok(());
-        }
-        self.pending = None;
-        self.show(step.time_s, picture)
-    }
-
-    pub(super) fn finish(mut self) -> Result<()> {
-        if let Some((time_s, picture)) = self.pending.take() {
-            self.show(time_s, picture)?;
-        }
-        let Some(film) = self.film.take() else { return Ok(()) };
-        film.finish().map_err(|e| fault(&self.path, e))?.complete()
     }
 
     /// Panorama and room in one picture.
@@ -145,6 +108,46 @@ impl<'a> VideoRecording<'a> {
     }
 }
 
+impl Recorder for VideoRecording<'_> {
+    fn begin(&mut self, _home: &HomeSnapshot, panorama: Option<&Panorama>) -> Result<()> {
+        // So that the picture has room for one from the first frame on.
+        self.panorama = panorama.and_then(strip);
+        Ok(())
+    }
+
+    fn record(&mut self, moment: &Moment<'_>) -> Result<()> {
+        let step = moment.step;
+        self.truth.push(step.truth);
+        let nowhere = Pose { x: f64::NAN, ..Pose::IDENTITY };
+        self.estimate.push(step.estimate.as_ref().map_or(nowhere, |e| self.world.home.compose(&e.pose)));
+        let due = step.time_s >= self.next_s - 1e-9;
+        if due && let Some(panorama) = moment.panorama {
+            self.panorama = strip(panorama);
+        }
+        // Those that are not due are drawn as well once the robot only comes to rest: the last of them ends the film.
+        if !due && step.seen.is_some() {
+            return Ok(());
+        }
+        let covariance = step.estimate.as_ref().map(|e| in_room(&self.world.home, e));
+        let sight = Sight { truth: &self.truth, estimate: &self.estimate, covariance, bodies: moment.bodies };
+        let picture = self.compose(&sight);
+        if !due {
+            self.pending = Some((step.time_s, picture));
+            return Ok(());
+        }
+        self.pending = None;
+        self.show(step.time_s, picture)
+    }
+
+    fn finish(&mut self, _record: &Record, _summary: &Summary) -> Result<()> {
+        if let Some((time_s, picture)) = self.pending.take() {
+            self.show(time_s, picture)?;
+        }
+        let Some(film) = self.film.take() else { return Ok(()) };
+        film.finish().map_err(|e| fault(&self.path, e))?.complete()
+    }
+}
+
 /// A panorama as wide as the film.
 fn strip(panorama: &Panorama) -> Option<RgbImage> {
     let (width, height) = (panorama.projection.width, panorama.projection.height);
@@ -163,7 +166,7 @@ fn fault(path: &Path, error: EncodingError) -> Error {
 
 /// The pictures one after the other.
 struct Film {
-    encoder: Encoder<RecordingFile>,
+    encoder: Encoder<PartialFile>,
     palette: Palette,
     size: (u16, u16),
     /// The last picture shown, and its numbers in the palette.
@@ -175,7 +178,7 @@ struct Film {
 }
 
 impl Film {
-    fn begin(file: RecordingFile, first: &RgbImage) -> std::result::Result<Self, EncodingError> {
+    fn begin(file: PartialFile, first: &RgbImage) -> std::result::Result<Self, EncodingError> {
         let palette = Palette::of(first);
         let size = (first.width() as u16, first.height() as u16);
         let mut encoder = Encoder::new(file, size.0, size.1, &palette.bytes())?;
@@ -234,7 +237,7 @@ impl Film {
         })
     }
 
-    fn finish(mut self) -> std::result::Result<RecordingFile, EncodingError> {
+    fn finish(mut self) -> std::result::Result<PartialFile, EncodingError> {
         self.write_waiting(None)?;
         let mut file = self.encoder.into_inner()?;
         file.flush()?;
@@ -318,7 +321,7 @@ mod tests {
             (0..8).for_each(|d| picture.put_pixel(10 + k * 7 + d, 12 + d, Rgb([213, 94, 0])));
             picture
         };
-        let mut film = Film::begin(RecordingFile::create(&path, &KIND).unwrap(), &picture(0)).unwrap();
+        let mut film = Film::begin(file::create(&path, &KIND).unwrap(), &picture(0)).unwrap();
         for (k, time_s) in [(0, 0.0), (1, 0.2), (2, 0.4), (3, 1.2)] {
             film.show(time_s, picture(k)).unwrap();
         }

@@ -133,43 +133,44 @@ fn hex(digest: &[u8]) -> String {
 
 /// A file that is written piece by piece and appears under its name when it is whole. One that is dropped before leaves nothing.
 #[derive(Debug)]
-pub struct GrowingFile {
+pub struct PartialFile {
     path: PathBuf,
     partial: PathBuf,
     writer: io::BufWriter<fs::File>,
-    hash: Sha256,
-    bytes: u64,
-    complete: bool,
+    /// Bytes written so far.
+    written: u64,
 }
 
-impl GrowingFile {
-    /// Begins a file.
+impl PartialFile {
+    /// Begins a file under another name.
     ///
     /// # Errors
     /// When it cannot be created.
     pub fn create(path: &Path) -> Result<Self> {
         let partial = partial_name(path);
         let file = fs::File::create(&partial).map_err(io_error("write", path))?;
-        let writer = io::BufWriter::with_capacity(1 << 18, file);
-        Ok(Self { path: path.to_owned(), partial, writer, hash: Sha256::new(), bytes: 0, complete: false })
+        Ok(Self { path: path.to_owned(), partial, writer: io::BufWriter::with_capacity(1 << 18, file), written: 0 })
     }
 
-    /// Puts it in its place; gives its SHA-256 and length.
+    /// Bytes written so far.
+    #[must_use]
+    pub fn written(&self) -> u64 {
+        self.written
+    }
+
+    /// Gives it its name.
     ///
     /// # Errors
     /// When what is left of it cannot be written.
-    pub fn complete(mut self) -> Result<(String, u64)> {
-        self.writer.flush().and_then(|()| fs::rename(&self.partial, &self.path)).map_err(io_error("write", &self.path))?;
-        self.complete = true;
-        Ok((hex(&std::mem::take(&mut self.hash).finalize()), self.bytes))
+    pub fn complete(mut self) -> Result<()> {
+        self.writer.flush().and_then(|()| fs::rename(&self.partial, &self.path)).map_err(io_error("write", &self.path))
     }
 }
 
-impl Write for GrowingFile {
+impl Write for PartialFile {
     fn write(&mut self, buffer: &[u8]) -> io::Result<usize> {
         let count = self.writer.write(buffer)?;
-        self.hash.update(&buffer[..count]);
-        self.bytes += count as u64;
+        self.written += count as u64;
         Ok(count)
     }
 
@@ -178,12 +179,54 @@ impl Write for GrowingFile {
     }
 }
 
-impl Drop for GrowingFile {
+impl io::Seek for PartialFile {
+    fn seek(&mut self, to: io::SeekFrom) -> io::Result<u64> {
+        self.writer.seek(to)
+    }
+}
+
+impl Drop for PartialFile {
     fn drop(&mut self) {
-        if !self.complete {
-            // Best effort: whoever writes the file again replaces this.
-            let _ = fs::remove_file(&self.partial);
-        }
+        // Best effort, and nothing to do once it is complete: whoever writes the file again replaces this.
+        let _ = fs::remove_file(&self.partial);
+    }
+}
+
+/// A [`PartialFile`] that tells its SHA-256 when it is whole.
+#[derive(Debug)]
+pub struct GrowingFile {
+    file: PartialFile,
+    hash: Sha256,
+}
+
+impl GrowingFile {
+    /// Begins a file.
+    ///
+    /// # Errors
+    /// When it cannot be created.
+    pub fn create(path: &Path) -> Result<Self> {
+        Ok(Self { file: PartialFile::create(path)?, hash: Sha256::new() })
+    }
+
+    /// Puts it in its place; gives its SHA-256 and length.
+    ///
+    /// # Errors
+    /// When what is left of it cannot be written.
+    pub fn complete(self) -> Result<(String, u64)> {
+        let told = (hex(&self.hash.finalize()), self.file.written);
+        self.file.complete().map(|()| told)
+    }
+}
+
+impl Write for GrowingFile {
+    fn write(&mut self, buffer: &[u8]) -> io::Result<usize> {
+        let count = self.file.write(buffer)?;
+        self.hash.update(&buffer[..count]);
+        Ok(count)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.file.flush()
     }
 }
 
