@@ -1,6 +1,6 @@
 //! `wayhome compare`: every method from the same starts.
 
-use std::ops::{ControlFlow, RangeInclusive};
+use std::ops::RangeInclusive;
 use std::path::PathBuf;
 
 use anyhow::Result;
@@ -93,10 +93,9 @@ pub fn run(args: &CompareArgs, context: &Context) -> Result<Verdict> {
     let places = usize::from(args.places);
     let bar = context.progress(Some(runs(&world, contenders.len(), &args.seeds, places)))?;
     bar.tick();
-    let comparison = compare(&world, &setup, &contenders, &args.seeds, places, rayon::current_num_threads(), &|contender| {
+    let comparison = compare(&world, &setup, &contenders, &args.seeds, places, &context.pool(), &|contender| {
         bar.set_message(contender.key.to_string());
         bar.inc(1);
-        if context.is_stopped() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     })?;
     bar.finish_and_clear();
     report::write(folder, &world, &comparison, &command(args))?;

@@ -8,6 +8,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use anyhow::{Context as _, Result};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde::Serialize;
+use wayhome::study::pool::Pool;
 
 use super::args::CommonArgs;
 
@@ -50,6 +51,11 @@ impl Context {
     /// Whether the user asked the command to stop.
     pub fn is_stopped(&self) -> bool {
         self.stopped.load(Ordering::Relaxed)
+    }
+
+    /// The workers of a study, which Ctrl-C stops.
+    pub fn pool(&self) -> Pool<'_> {
+        Pool { threads: rayon::current_num_threads(), stopped: &self.stopped }
     }
 
     /// Prints a result: as one JSON object where the user asked for it, else as text.

@@ -12,7 +12,8 @@ use wayhome::record::run::RunFiles;
 use wayhome::report::{seeds as seeds_report, text};
 use wayhome::sensor::Noise;
 use wayhome::storage::OutputFolder;
-use wayhome::study::seeds::{SeedEvent, SeedsSummary, run_seeds};
+use wayhome::study::row::RunRow;
+use wayhome::study::seeds::{SeedsSummary, run_seeds};
 use wayhome::study::sweep::Row;
 use wayhome::study::sweep::store::StudyFolder;
 use wayhome::vision::ExtractorSettings;
@@ -64,7 +65,7 @@ fn replay(args: &HomeArgs, context: &Context, folder: &Path, episode: u64) -> Re
     let (world, setup) = study.case(&row.values)?;
     let out = args.out.clone();
     let out = out.unwrap_or_else(|| default_folder(&["home", &study.name, &episode.to_string()]));
-    let summary = single(args, context, &world, &setup, row.seed, &out)?;
+    let summary = single(args, context, &world, &setup, row.run.seed, &out)?;
     let again = Row::of(episode, row.cell, &row.values, &summary);
     if again != row {
         bail!("episode {episode} of {} did not run as its row says: another machine or build made it", folder.display());
@@ -112,22 +113,19 @@ fn batch(args: &HomeArgs, context: &Context, world: &World, setup: &Setup, seeds
     let bar = context.progress(Some(seeds.end() - seeds.start() + 1))?;
     bar.tick();
     let home = Mutex::new(0_usize);
-    let watch = |event: SeedEvent<'_>| {
-        if let SeedEvent::Done(summary) = event {
-            if let Ok(mut home) = home.lock() {
-                *home += usize::from(summary.outcome == Outcome::Home);
-                bar.set_message(format!("{home} home"));
-            }
-            bar.inc(1);
+    let runs = run_seeds(world, setup, seeds.clone(), &context.pool(), &|summary| {
+        if let Ok(mut home) = home.lock() {
+            *home += usize::from(summary.outcome == Outcome::Home);
+            bar.set_message(format!("{home} home"));
         }
-        if context.is_stopped() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-    };
-    let runs = run_seeds(world, setup, seeds.clone(), rayon::current_num_threads(), &watch)?;
+        bar.inc(1);
+    })?;
     bar.finish_and_clear();
-    let batch = SeedsSummary::new(&runs, seeds, world, setup);
-    seeds_report::write(folder, &batch, &runs)?;
+    let rows: Vec<RunRow> = runs.iter().map(RunRow::from).collect();
+    let batch = SeedsSummary::new(&rows, seeds, world, setup);
+    seeds_report::write(folder, &batch, &rows)?;
     let output = BatchOutput { batch: &batch, per_seed: &runs, out: out.display().to_string() };
-    context.print(&output, || text::seeds(&batch, &runs, &out))?;
+    context.print(&output, || text::seeds(&batch, &rows, &out))?;
     Ok(Verdict::Done)
 }
 

@@ -1,14 +1,11 @@
 //! `wayhome robustness`: success against conditions that worsen one at a time.
 
-use std::ops::ControlFlow;
-
 use anyhow::Result;
 use serde::Serialize;
 use wayhome::episode::Setup;
 use wayhome::report::robustness as report;
 use wayhome::storage::OutputFolder;
 use wayhome::study::robustness::{Axis, Robustness, batches, run as run_study};
-use wayhome::study::seeds::SeedEvent;
 use wayhome::world::World;
 
 use super::Verdict;
@@ -42,12 +39,9 @@ pub fn run(args: &RobustnessArgs, context: &Context) -> Result<Verdict> {
     let runs = batches(&axes) as u64 * (args.seeds.end() - args.seeds.start() + 1);
     let bar = context.progress(Some(runs))?;
     bar.tick();
-    let study = run_study(&world, &setup, &axes, &args.seeds, rayon::current_num_threads(), &|told| {
-        if let SeedEvent::Done(_) = told.event {
-            bar.set_message(format!("{} {}", told.axis.name(), told.level));
-            bar.inc(1);
-        }
-        if context.is_stopped() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    let study = run_study(&world, &setup, &axes, &args.seeds, &context.pool(), &|axis, level| {
+        bar.set_message(format!("{} {level}", axis.name()));
+        bar.inc(1);
     })?;
     bar.finish_and_clear();
     report::write(folder, &study, &command(args))?;

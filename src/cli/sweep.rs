@@ -170,18 +170,18 @@ fn sweep(args: &SweepArgs, argument: &str, context: &Context) -> Result<Verdict>
     let done = folder.done()?;
     let chunks: Vec<u64> = (0..study.chunks()).filter(|k| k % of == shard - 1 && !done.contains(k)).collect();
     let episodes: u64 = chunks.iter().map(|&k| study.chunk(k).count).sum();
-    let threads = rayon::current_num_threads();
     let bar = context.progress(Some(episodes))?;
     let (began, tally) = (Instant::now(), Mutex::new((0_u64, 0_u64)));
     let watch = |row: &Row| {
         if let Ok(mut tally) = tally.lock() {
-            *tally = (tally.0 + 1, tally.1 + u64::from(row.is_home()));
+            *tally = (tally.0 + 1, tally.1 + u64::from(row.run.is_home()));
             bar.set_message(progress(*tally, episodes, began.elapsed().as_secs_f64()));
         }
         bar.inc(1);
-        ControlFlow::Continue(())
     };
-    let result = run_chunks(study, &chunks, threads, &folder, &watch, &|| context.is_stopped());
+    let pool = context.pool();
+    let threads = pool.threads;
+    let result = run_chunks(study, &chunks, &pool, &folder, &watch);
     bar.finish_and_clear();
     let (run, _) = tally.into_inner().unwrap_or_default();
     let wall_s = began.elapsed().as_secs_f64();
@@ -210,7 +210,7 @@ fn report_end(context: &Context, folder: &StudyFolder, shard: [u64; 2], complete
         out,
     };
     context.print(&output, || {
-        let home = rows.iter().filter(|row| row.is_home()).count();
+        let home = rows.iter().filter(|row| row.run.is_home()).count();
         let [low, high] = wilson_95(home, rows.len());
         let rate = &output.rate;
         format!(

@@ -13,7 +13,7 @@ use crate::geometry::Vector2;
 use crate::method::MethodKind;
 use crate::storage::OutputFolder;
 use crate::study::compare::{Comparison, Contender, Standing};
-use crate::study::seeds::Spread;
+use crate::study::tally::Spread;
 use crate::world::World;
 
 /// Names of all files of a comparison.
@@ -82,21 +82,21 @@ pub fn csv(comparison: &Comparison) -> String {
     let mut text = COLUMNS.to_owned();
     let number = |value: Option<f64>| value.map_or_else(String::new, |v| v.to_string());
     for s in &comparison.standings {
-        let [low, high] = s.home_share_95;
+        let [low, high] = s.tally.home_share_95;
         let _ = writeln!(
             text,
             "{},{},{},{},{},{low},{high},{},{},{},{},{},{},{},{}",
             s.contender.key,
             told(&s.contender),
             law(&s.contender),
-            s.runs,
-            s.home,
-            s.wrong_claims,
-            number(s.time_ratio.median),
-            number(s.time_ratio.p90),
+            s.tally.runs,
+            s.tally.home,
+            s.tally.wrong_claims,
+            number(s.tally.time_ratio.median),
+            number(s.tally.time_ratio.p90),
             number(s.path_ratio.median),
-            number(s.final_distance_m.median),
-            number(s.final_distance_m.p90),
+            number(s.tally.final_distance_m.median),
+            number(s.tally.final_distance_m.p90),
             number(s.aae_rad.map(f64::to_degrees)),
             number(s.catchment_share),
         );
@@ -106,7 +106,7 @@ pub fn csv(comparison: &Comparison) -> String {
 
 /// The cells of a contender's row in the order of [`HEAD`].
 fn cells(s: &Standing) -> [String; 11] {
-    let [low, high] = s.home_share_95;
+    let [low, high] = s.tally.home_share_95;
     let value = |value: Option<f64>, scale: f64, decimals: usize| {
         value.map_or_else(|| "-".to_owned(), |v| format!("{:.decimals$}", scale * v))
     };
@@ -114,13 +114,13 @@ fn cells(s: &Standing) -> [String; 11] {
     [
         s.contender.key.to_string(),
         told(&s.contender).to_owned(),
-        format!("{}/{}", s.home, s.runs),
+        format!("{}/{}", s.tally.home, s.tally.runs),
         format!("{:.0}-{:.0} %", 100.0 * low, 100.0 * high),
-        s.wrong_claims.to_string(),
-        median(&s.time_ratio, 1.0),
-        value(s.time_ratio.p90, 1.0, 2),
+        s.tally.wrong_claims.to_string(),
+        median(&s.tally.time_ratio, 1.0),
+        value(s.tally.time_ratio.p90, 1.0, 2),
         median(&s.path_ratio, 1.0),
-        value(s.final_distance_m.median, 100.0, 1),
+        value(s.tally.final_distance_m.median, 100.0, 1),
         value(s.aae_rad.map(f64::to_degrees), 1.0, 1),
         value(s.catchment_share, 100.0, 0),
     ]
@@ -265,9 +265,9 @@ fn chart(comparison: &Comparison) -> String {
         .add(text("told", 770.0, TOP_PX - 10.0, 12.0));
     for (k, s) in comparison.standings.iter().enumerate() {
         let middle = TOP_PX + (k as f64 + 0.5) * ROW_PX;
-        let share = s.home as f64 / s.runs.max(1) as f64;
-        let [low, high] = s.home_share_95;
-        let ratio = s.time_ratio.median.map_or("-".to_owned(), |r| format!("{r:.2}"));
+        let share = s.tally.home as f64 / s.tally.runs.max(1) as f64;
+        let [low, high] = s.tally.home_share_95;
+        let ratio = s.tally.time_ratio.median.map_or("-".to_owned(), |r| format!("{r:.2}"));
         body = body
             .add(text(&s.contender.key, BAR_PX[0] - 8.0, middle + 4.0, 12.0).set("text-anchor", "end"))
             .add(

@@ -53,19 +53,19 @@ pub fn csv(study: &Robustness) -> String {
         let row: [String; 15] = [
             cell.axis.name().to_owned(),
             cell.level.to_string(),
-            cell.runs.to_string(),
-            cell.home.to_string(),
+            cell.tally.runs.to_string(),
+            cell.tally.home.to_string(),
             share(cell).to_string(),
-            cell.home_share_95[0].to_string(),
-            cell.home_share_95[1].to_string(),
-            cell.wrong_claims.to_string(),
-            cell.outcomes.timeout.to_string(),
-            cell.outcomes.lost.to_string(),
-            cell.outcomes.stuck.to_string(),
-            number(cell.time_ratio.median),
-            number(cell.time_ratio.p90),
-            number(cell.final_distance_m.median),
-            number(cell.final_distance_m.p90),
+            cell.tally.home_share_95[0].to_string(),
+            cell.tally.home_share_95[1].to_string(),
+            cell.tally.wrong_claims.to_string(),
+            cell.tally.outcomes.timeout.to_string(),
+            cell.tally.outcomes.lost.to_string(),
+            cell.tally.outcomes.stuck.to_string(),
+            number(cell.tally.time_ratio.median),
+            number(cell.tally.time_ratio.p90),
+            number(cell.tally.final_distance_m.median),
+            number(cell.tally.final_distance_m.p90),
         ];
         text.push_str(&row.join(","));
         text.push('\n');
@@ -74,7 +74,7 @@ pub fn csv(study: &Robustness) -> String {
 }
 
 fn share(cell: &Cell) -> f64 {
-    cell.home as f64 / cell.runs.max(1) as f64
+    cell.tally.home as f64 / cell.tally.runs.max(1) as f64
 }
 
 /// What gets worse, with its unit.
@@ -149,25 +149,25 @@ pub fn readme(study: &Robustness, command: &str) -> String {
 }
 
 fn markdown_row(cell: &Cell) -> String {
-    let [low, high] = cell.home_share_95;
+    let [low, high] = cell.tally.home_share_95;
     let optional = |value: Option<f64>, scale: f64, unit: &str| {
         value.map_or_else(|| "-".to_owned(), |v| format!("{:.2}{unit}", scale * v))
     };
-    let o = cell.outcomes;
+    let o = cell.tally.outcomes;
     format!(
         "| {} | {}/{} | {:.0}-{:.0} % | {} | {}, {}, {} | {} | {} | {} |\n",
         cell.level,
-        cell.home,
-        cell.runs,
+        cell.tally.home,
+        cell.tally.runs,
         100.0 * low,
         100.0 * high,
-        cell.wrong_claims,
+        cell.tally.wrong_claims,
         o.timeout,
         o.lost,
         o.stuck,
-        optional(cell.time_ratio.median, 1.0, ""),
-        optional(cell.time_ratio.p90, 1.0, ""),
-        optional(cell.final_distance_m.median, 100.0, " cm"),
+        optional(cell.tally.time_ratio.median, 1.0, ""),
+        optional(cell.tally.time_ratio.p90, 1.0, ""),
+        optional(cell.tally.final_distance_m.median, 100.0, " cm"),
     )
 }
 
@@ -179,18 +179,18 @@ pub fn table(study: &Robustness) -> String {
         "axis", "level", "home", "95 %", "wrong", "ratio, 90 %", "final cm"
     );
     for cell in &study.cells {
-        let [low, high] = cell.home_share_95;
+        let [low, high] = cell.tally.home_share_95;
         let optional = |value: Option<f64>, scale: f64| value.map_or_else(|| "-".to_owned(), |v| format!("{:.2}", scale * v));
         let _ = writeln!(
             text,
             "{:<26} {:>5}  {:>9}  {:>9}  {:>5}  {:>12}  {:>8}",
             title(cell.axis),
             cell.level,
-            format!("{}/{}", cell.home, cell.runs),
+            format!("{}/{}", cell.tally.home, cell.tally.runs),
             format!("{low:.2}-{high:.2}"),
-            cell.wrong_claims,
-            format!("{}, {}", optional(cell.time_ratio.median, 1.0), optional(cell.time_ratio.p90, 1.0)),
-            optional(cell.final_distance_m.median, 100.0),
+            cell.tally.wrong_claims,
+            format!("{}, {}", optional(cell.tally.time_ratio.median, 1.0), optional(cell.tally.time_ratio.p90, 1.0)),
+            optional(cell.tally.final_distance_m.median, 100.0),
         );
     }
     text
@@ -205,6 +205,7 @@ fn name(part: &impl Serialize) -> String {
 mod tests {
     use super::*;
     use crate::episode::{SensorKind, Setup};
+    use crate::study::pool::Pool;
     use crate::study::robustness::run;
     use crate::world::World;
 
@@ -212,7 +213,7 @@ mod tests {
     fn files_tell_the_same_story() {
         let world = World::open("lab").unwrap();
         let setup = Setup { sensor: SensorKind::Ideal, time_limit_s: Some(0.5), ..Setup::default() };
-        let study = run(&world, &setup, &Axis::ALL, &(1..=2), 1, &|_| std::ops::ControlFlow::Continue(())).unwrap();
+        let study = run(&world, &setup, &Axis::ALL, &(1..=2), &Pool::new(1), &|_, _| ()).unwrap();
         let command = "wayhome robustness lab --seeds 1..2";
         let (table, text, picture) = (csv(&study), readme(&study, command), panels::svg(&study));
         assert_eq!(table.lines().count(), 1 + study.cells.len());

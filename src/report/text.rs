@@ -5,7 +5,9 @@ use std::path::Path;
 
 use crate::episode::open_loop::DriveSummary;
 use crate::episode::{Outcome, PoseRecord, Summary};
-use crate::study::seeds::{SeedsSummary, Spread};
+use crate::study::row::RunRow;
+use crate::study::seeds::SeedsSummary;
+use crate::study::tally::Spread;
 
 /// One run.
 #[must_use]
@@ -106,32 +108,32 @@ pub fn drive(summary: &DriveSummary, folder: &Path) -> String {
 
 /// A batch.
 #[must_use]
-pub fn seeds(batch: &SeedsSummary, runs: &[Summary], folder: &Path) -> String {
-    let b = batch;
+pub fn seeds(batch: &SeedsSummary, rows: &[RunRow], folder: &Path) -> String {
+    let (b, t) = (batch, &batch.tally);
     let mut text = format!(
         "{:>6}  {:<8} {:>8} {:>9} {:>8} {:>6} {:>6}\n",
         "seed", "outcome", "start m", "final cm", "time s", "ratio", "nees"
     );
-    for run in runs {
+    for row in rows {
         let optional = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |v| format!("{v:.2}"));
         let _ = writeln!(
             text,
             "{:>6}  {:<8} {:>8.2} {:>9.2} {:>8.1} {:>6} {:>6}",
-            run.seed,
-            run.outcome.name(),
-            run.start_distance_m,
-            100.0 * run.final_distance_m,
-            run.time_s,
-            optional(run.time_ratio),
-            optional(run.estimate.and_then(|e| e.nees)),
+            row.seed,
+            <&str>::from(row.outcome),
+            row.start_distance_m.unwrap_or(f64::NAN),
+            100.0 * row.final_distance_m.unwrap_or(f64::NAN),
+            row.time_s.unwrap_or(f64::NAN),
+            optional(row.time_ratio),
+            optional(row.nees),
         );
     }
-    let [low, high] = b.home_share_95;
+    let [low, high] = t.home_share_95;
     let headline = format!(
         "\nhome within {}: {}/{} (95 % Wilson {low:.2}-{high:.2})",
         centimetres(b.setup.arrival_radius_m),
-        b.home,
-        b.runs
+        t.home,
+        t.runs
     );
     let spread = |s: &Spread, scale: f64, unit: &str| match (s.median, s.p90, s.max) {
         (Some(median), Some(p90), Some(max)) => {
@@ -140,16 +142,16 @@ pub fn seeds(batch: &SeedsSummary, runs: &[Summary], folder: &Path) -> String {
         _ => "-".to_owned(),
     };
     let rows = [
-        ("time ratio", spread(&b.time_ratio, 1.0, "")),
-        ("final distance", spread(&b.final_distance_m, 100.0, " cm")),
-        ("where it claimed home", spread(&b.claimed_distance_m, 100.0, " cm")),
-        ("range error at end", spread(&b.range_error_m, 100.0, " cm")),
-        ("odometry drift", spread(&b.odometry_drift_m, 100.0, " cm")),
-        ("NEES (3 is consistent)", spread(&b.nees, 1.0, "")),
-        ("wrong claims", b.wrong_claims.to_string()),
-        ("timeout, lost, stuck", format!("{}, {}, {}", b.outcomes.timeout, b.outcomes.lost, b.outcomes.stuck)),
-        ("method broke", b.outcomes.failed.to_string()),
-        ("runs with collisions", b.runs_with_collisions.to_string()),
+        ("time ratio", spread(&t.time_ratio, 1.0, "")),
+        ("final distance", spread(&t.final_distance_m, 100.0, " cm")),
+        ("where it claimed home", spread(&t.claimed_distance_m, 100.0, " cm")),
+        ("range error at end", spread(&t.range_error_m, 100.0, " cm")),
+        ("odometry drift", spread(&t.odometry_drift_m, 100.0, " cm")),
+        ("NEES (3 is consistent)", spread(&t.nees, 1.0, "")),
+        ("wrong claims", t.wrong_claims.to_string()),
+        ("timeout, lost, stuck", format!("{}, {}, {}", t.outcomes.timeout, t.outcomes.lost, t.outcomes.stuck)),
+        ("method broke", t.outcomes.failed.to_string()),
+        ("runs with collisions", t.runs_with_collisions.to_string()),
         ("files", folder.display().to_string()),
     ];
     let shown = rows.into_iter().filter(|(name, value)| *name != "method broke" || value != "0");

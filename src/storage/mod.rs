@@ -1,5 +1,6 @@
 //! Files on disk that appear whole or not at all, their fingerprints, and how much room is left for more.
 
+mod csv;
 mod folder;
 
 use std::fs;
@@ -10,6 +11,7 @@ use sha2::{Digest, Sha256};
 
 use crate::error::{Error, Result};
 
+pub use csv::{csv, csv_with, decimal};
 pub use folder::{FolderFile, OutputFolder};
 pub(crate) use folder::{MARKER, files, remove};
 

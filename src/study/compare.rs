@@ -5,12 +5,14 @@
 //! for methods that have a homing vector at standstill the mean angle between it and the direction of home is its AAE.
 
 use std::borrow::Cow;
-use std::ops::{ControlFlow, RangeInclusive};
+use std::ops::RangeInclusive;
 
 use serde::Serialize;
 
-use super::seeds::{Job, SeedEvent, Spread, run_jobs};
-use super::statistics::wilson_95;
+use super::pool::Pool;
+use super::row::RunRow;
+use super::seeds::{Job, run_jobs};
+use super::tally::{Spread, Tally};
 use crate::control::Law;
 use crate::control::vectors::{VectorLaw, align};
 use crate::episode::{Outcome, PlantKind, SensorKind, Setup, SetupRecord, Simulation, Summary};
@@ -119,20 +121,11 @@ pub struct GridStart {
 pub struct Standing {
     /// Who.
     pub contender: Contender,
-    /// Random starts.
-    pub runs: usize,
-    /// Those from which it came home.
-    pub home: usize,
-    /// 95 % Wilson interval of their share.
-    pub home_share_95: [f64; 2],
-    /// Runs that claimed to be home and came to rest outside the arrival radius.
-    pub wrong_claims: usize,
-    /// Time over straight-line time, of the runs that came home.
-    pub time_ratio: Spread,
+    /// Its runs from random starts.
+    #[serde(flatten)]
+    pub tally: Tally,
     /// Path length over straight distance, of the runs that came home.
     pub path_ratio: Spread,
-    /// Distance from home at the end of all runs, m.
-    pub final_distance_m: Spread,
     /// Mean angle between homing vector and direction of home over the grid, rad; `None` for filters.
     pub aae_rad: Option<f64>,
     /// Share of the grid's starts from which it came home; `None` without a grid.
@@ -173,35 +166,34 @@ pub struct Comparison {
 /// Heading of the grid's starts relative to home, rad: a little over a quarter turn, so that no alignment comes for free.
 const GRID_HEADING_RAD: f64 = 2.0;
 
-/// Runs all `contenders` on the same starts: one random one a seed, and about `places` on an even grid over the start region.
-///
-/// `watch` is called once a run and stops the comparison with `Break`.
+/// Runs all `contenders` on the same starts: one random one a seed, and about `places` on an even grid over the start region. `watch` is
+/// told of each run's end.
 ///
 /// # Errors
-/// What a run fails with; [`Error::Interrupted`] when `watch` breaks.
+/// What a run fails with, or that the pool was stopped.
 pub fn compare(
     world: &World,
     setup: &Setup,
     contenders: &[Contender],
     seeds: &RangeInclusive<u64>,
     places: usize,
-    threads: usize,
-    watch: &(dyn Fn(&Contender) -> ControlFlow<()> + Sync),
+    pool: &Pool<'_>,
+    watch: &(dyn Fn(&Contender) + Sync),
 ) -> Result<Comparison> {
     let heading = wrap(world.home.heading + GRID_HEADING_RAD);
     let (grid_spacing_m, grid) = grid_starts(world, places, heading);
-    let mut jobs: Vec<Job> = seeds.clone().map(|seed| Job { seed, start: None }).collect();
-    let random = jobs.len();
-    jobs.extend(grid.iter().zip(1..).map(|(start, seed)| Job { seed, start: Some(*start) }));
+    let mut starts: Vec<(u64, Option<Pose>)> = seeds.clone().map(|seed| (seed, None)).collect();
+    let random = starts.len();
+    starts.extend((1..).zip(grid.iter().copied().map(Some)));
+    let setups: Vec<Setup> = contenders.iter().map(|contender| contender.setup(setup)).collect();
+    let cases: Vec<(&World, &Setup)> = setups.iter().map(|setup| (world, setup)).collect();
+    let jobs = (0..cases.len()).flat_map(|case| starts.iter().map(move |&(seed, start)| Job { case, seed, start }));
+    let runs = run_jobs(&cases, &jobs.collect::<Vec<_>>(), pool, &|job, _| watch(&contenders[job.case]))?;
     let mut standings = Vec::new();
-    for contender in contenders {
-        let own = contender.setup(setup);
-        let runs = run_jobs(world, &own, &jobs, threads, &|event| match event {
-            SeedEvent::Done(_) => watch(contender),
-            SeedEvent::Step(_) => ControlFlow::Continue(()),
-        })?;
-        let vectors = vectors(world, &own, contender, &grid)?;
-        standings.push(standing(contender, &runs[..random], &runs[random..], &vectors));
+    for ((contender, own), runs) in contenders.iter().zip(&setups).zip(runs.chunks(starts.len())) {
+        let rows: Vec<RunRow> = runs.iter().map(RunRow::from).collect();
+        let vectors = vectors(world, own, contender, &grid)?;
+        standings.push(Standing::new(contender, &rows[..random], &runs[random..], &vectors));
     }
     let shared = SetupRecord::new(setup, world);
     Ok(Comparison {
@@ -280,23 +272,11 @@ fn vectors(world: &World, setup: &Setup, contender: &Contender, grid: &[Pose]) -
     grid.iter().map(look).collect()
 }
 
-fn standing(contender: &Contender, random: &[Summary], grid: &[Summary], vectors: &[Option<(f64, f64)>]) -> Standing {
-    let arrived = |runs: &[Summary]| runs.iter().filter(|r| r.outcome == Outcome::Home).count();
-    let home = arrived(random);
-    let errors: Vec<f64> = vectors.iter().flatten().map(|v| v.1).collect();
-    let came = || random.iter().filter(|r| r.outcome == Outcome::Home);
-    Standing {
-        contender: contender.clone(),
-        runs: random.len(),
-        home,
-        home_share_95: wilson_95(home, random.len()),
-        wrong_claims: random.iter().filter(|r| r.is_wrong_claim()).count(),
-        time_ratio: Spread::of(came().filter_map(|r| r.time_ratio)),
-        path_ratio: Spread::of(came().map(|r| r.path_length_m / r.start_distance_m)),
-        final_distance_m: Spread::of(random.iter().map(|r| r.final_distance_m)),
-        aae_rad: (!errors.is_empty()).then(|| errors.iter().sum::<f64>() / errors.len() as f64),
-        catchment_share: (!grid.is_empty()).then(|| arrived(grid) as f64 / grid.len() as f64),
-        grid: grid
+impl Standing {
+    fn new(contender: &Contender, random: &[RunRow], grid: &[Summary], vectors: &[Option<(f64, f64)>]) -> Self {
+        let errors: Vec<f64> = vectors.iter().flatten().map(|v| v.1).collect();
+        let came = random.iter().filter(|row| row.is_home());
+        let grid: Vec<GridStart> = grid
             .iter()
             .zip(vectors)
             .map(|(run, vector)| GridStart {
@@ -306,7 +286,16 @@ fn standing(contender: &Contender, random: &[Summary], grid: &[Summary], vectors
                 vector_rad: vector.map(|v| v.0),
                 vector_error_rad: vector.map(|v| v.1),
             })
-            .collect(),
+            .collect();
+        let arrived = grid.iter().filter(|start| start.outcome == Outcome::Home).count();
+        Self {
+            contender: contender.clone(),
+            tally: Tally::of(random),
+            path_ratio: Spread::of(came.filter_map(|row| Some(row.path_length_m? / row.start_distance_m?))),
+            aae_rad: (!errors.is_empty()).then(|| errors.iter().sum::<f64>() / errors.len() as f64),
+            catchment_share: (!grid.is_empty()).then(|| arrived as f64 / grid.len() as f64),
+            grid,
+        }
     }
 }
 
@@ -332,14 +321,17 @@ mod tests {
         let setup = Setup { plant: PlantKind::Unicycle, sensor: SensorKind::Ideal, ..Setup::default() };
         let names = ["paper-ekf-told", "alv-compass", "ibvs"].map(str::to_owned);
         let contenders = pick(&names).unwrap();
-        let result = compare(&world, &setup, &contenders, &(1..=3), 9, 2, &|_| ControlFlow::Continue(())).unwrap();
+        let result = compare(&world, &setup, &contenders, &(1..=3), 9, &Pool::new(2), &|_| ()).unwrap();
         let starts = |s: &Standing| s.grid.iter().map(|g| [g.x_m, g.y_m]).collect::<Vec<_>>();
         assert_eq!(result.standings.len(), 3);
         assert!(
-            result.standings.iter().all(|s| s.runs == 3 && starts(s) == starts(&result.standings[0]) && !s.grid.is_empty())
+            result
+                .standings
+                .iter()
+                .all(|s| s.tally.runs == 3 && starts(s) == starts(&result.standings[0]) && !s.grid.is_empty())
         );
         let told = &result.standings[0];
-        assert_eq!((told.home, told.aae_rad), (3, None), "told the truth it arrives");
+        assert_eq!((told.tally.home, told.aae_rad), (3, None), "told the truth it arrives");
         // With a compass and exact bearings an average landmark vector is never more than a right angle off.
         let compass = &result.standings[1];
         assert!(compass.grid.iter().all(|g| g.vector_error_rad.unwrap() < 1.6) && compass.aae_rad.unwrap() < 0.8);

@@ -4,13 +4,16 @@
 //! them one condition gets worse level by level while the others stay as they are, and every level runs the same seeds: the
 //! same starts, and with them the same draws wherever the condition leaves them alone.
 
-use std::ops::{ControlFlow, RangeInclusive};
+use std::ops::RangeInclusive;
 
 use serde::Serialize;
 use strum::{EnumMessage, IntoStaticStr, VariantArray};
 
-use super::seeds::{OutcomeCounts, SeedEvent, SeedsSummary, Spread, run_seeds};
-use crate::episode::{Setup, SetupRecord, Summary};
+use super::pool::Pool;
+use super::row::RunRow;
+use super::seeds::run_seeds;
+use super::tally::Tally;
+use crate::episode::{Setup, SetupRecord};
 use crate::error::{Error, Result};
 use crate::sensor::Degradation;
 use crate::world::World;
@@ -78,20 +81,9 @@ pub struct Cell {
     pub axis: Axis,
     /// Level in the axis' unit.
     pub level: f64,
-    /// Runs.
-    pub runs: usize,
-    /// Runs that ended at home, within the arrival radius.
-    pub home: usize,
-    /// 95 % Wilson interval of their share.
-    pub home_share_95: [f64; 2],
-    /// Runs that claimed to be home and came to rest outside the arrival radius.
-    pub wrong_claims: usize,
-    /// Runs by outcome.
-    pub outcomes: OutcomeCounts,
-    /// Time over straight-line time, of the runs that reached home.
-    pub time_ratio: Spread,
-    /// Final distance to home of all runs, m.
-    pub final_distance_m: Spread,
+    /// Its runs.
+    #[serde(flatten)]
+    pub tally: Tally,
 }
 
 /// The study in numbers.
@@ -113,17 +105,6 @@ pub struct Robustness {
     pub version: &'static str,
 }
 
-/// What a watcher of the study is told.
-#[derive(Debug, Clone, Copy)]
-pub struct RobustnessEvent<'a> {
-    /// Axis that is under way.
-    pub axis: Axis,
-    /// Its level.
-    pub level: f64,
-    /// What happened in one of its runs.
-    pub event: SeedEvent<'a>,
-}
-
 /// How many batches of seeds a study of `axes` runs. Levels of two axes that are the same condition are run once.
 #[must_use]
 pub fn batches(axes: &[Axis]) -> usize {
@@ -141,18 +122,18 @@ fn cells(axes: &[Axis]) -> impl Iterator<Item = (Axis, f64)> + '_ {
     axes.iter().flat_map(|&axis| axis.levels().iter().map(move |&level| (axis, level)))
 }
 
-/// Runs all levels of `axes` on all seeds, `threads` runs at a time. The result depends on the world, the setup, the axes and
+/// Runs all levels of `axes` on all seeds. `watch` is told of each run's end. The result depends on the world, the setup, the axes and
 /// the seeds alone.
 ///
 /// # Errors
-/// When no axis or no seed is given, the setup has a degradation of its own, a run fails, or `watch` breaks.
+/// When no axis or no seed is given, the setup has a degradation of its own, a run fails, or the pool is stopped.
 pub fn run(
     world: &World,
     setup: &Setup,
     axes: &[Axis],
     seeds: &RangeInclusive<u64>,
-    threads: usize,
-    watch: &(dyn Fn(RobustnessEvent<'_>) -> ControlFlow<()> + Sync),
+    pool: &Pool<'_>,
+    watch: &(dyn Fn(Axis, f64) + Sync),
 ) -> Result<Robustness> {
     let invalid = |what: &str, found: &str, allowed: &str| {
         Err(Error::Invalid { what: what.into(), found: found.into(), allowed: allowed.into() })
@@ -166,7 +147,7 @@ pub fn run(
     if !setup.degradation.is_none() {
         return invalid("degradation of the setup", "some", "none: the study sets it level by level");
     }
-    let mut done: Vec<(Condition, Vec<Summary>)> = Vec::new();
+    let mut done: Vec<(Condition, Vec<RunRow>)> = Vec::new();
     let mut table = Vec::new();
     for (axis, level) in cells(axes) {
         let condition = axis.condition(level);
@@ -174,14 +155,14 @@ pub fn run(
         let place = match known {
             Some(place) => place,
             None => {
-                let watch = |event: SeedEvent<'_>| watch(RobustnessEvent { axis, level, event });
-                done.push((condition, run_condition(world, setup, &condition, seeds, threads, &watch)?));
+                let rows = run_condition(world, setup, &condition, seeds, pool, &|| watch(axis, level))?;
+                done.push((condition, rows));
                 done.len() - 1
             }
         };
-        table.push(Cell::new(axis, level, &done[place].1, seeds, world, setup));
+        table.push(Cell { axis, level, tally: Tally::of(&done[place].1) });
     }
-    let renderer = done.iter().flat_map(|(_, runs)| runs).find_map(|r| Some(r.renderer.as_ref()?.kind.clone()));
+    let renderer = done.iter().flat_map(|(_, runs)| runs).find_map(|r| r.renderer.clone());
     Ok(Robustness {
         seeds: [*seeds.start(), *seeds.end()],
         cells: table,
@@ -198,12 +179,13 @@ fn run_condition(
     setup: &Setup,
     condition: &Condition,
     seeds: &RangeInclusive<u64>,
-    threads: usize,
-    watch: &(dyn Fn(SeedEvent<'_>) -> ControlFlow<()> + Sync),
-) -> Result<Vec<Summary>> {
+    pool: &Pool<'_>,
+    watch: &(dyn Fn() + Sync),
+) -> Result<Vec<RunRow>> {
     let setup = Setup { degradation: condition.degradation, ..setup.clone() };
     let floored = condition.friction.map(|friction| with_friction(world, friction)).transpose()?;
-    run_seeds(floored.as_ref().unwrap_or(world), &setup, seeds.clone(), threads, watch)
+    let runs = run_seeds(floored.as_ref().unwrap_or(world), &setup, seeds.clone(), pool, &|_| watch())?;
+    Ok(runs.iter().map(RunRow::from).collect())
 }
 
 /// The same world with one friction everywhere.
@@ -212,14 +194,6 @@ fn with_friction(world: &World, friction: f64) -> Result<World> {
     spec.floor.friction = friction;
     spec.floor.zones.clear();
     World::from_spec(&spec, &world.source)
-}
-
-impl Cell {
-    fn new(axis: Axis, level: f64, runs: &[Summary], seeds: &RangeInclusive<u64>, world: &World, setup: &Setup) -> Self {
-        let SeedsSummary { home, home_share_95, wrong_claims, outcomes, time_ratio, final_distance_m, .. } =
-            SeedsSummary::new(runs, seeds, world, setup);
-        Self { axis, level, runs: runs.len(), home, home_share_95, wrong_claims, outcomes, time_ratio, final_distance_m }
-    }
 }
 
 #[cfg(test)]
@@ -241,16 +215,15 @@ mod tests {
     fn wrong_claims_are_those_outside_the_arrival_radius() {
         let world = World::open("lab").unwrap();
         let setup = Setup { sensor: SensorKind::Ideal, method: MethodKind::Alv, ..Setup::default() };
-        let watch = &|_: RobustnessEvent<'_>| ControlFlow::Continue(());
-        let study = run(&world, &setup, &[Axis::Noise], &(1..=8), 1, watch).unwrap();
+        let study = run(&world, &setup, &[Axis::Noise], &(1..=8), &Pool::new(1), &|_, _| ()).unwrap();
         let worst = study.cells.last().unwrap();
         let noisy =
             Setup { degradation: Degradation { noise_sd_rad: 2.0_f64.to_radians(), ..Degradation::default() }, ..setup };
-        let runs = run_seeds(&world, &noisy, 1..=8, 1, &|_| ControlFlow::Continue(())).unwrap();
+        let runs = run_seeds(&world, &noisy, 1..=8, &Pool::new(1), &|_| ()).unwrap();
         let wrong = runs.iter().filter(|r| r.claimed_home && r.final_distance_m > world.spec.task.arrival_radius_m);
         let off_cm: Vec<f64> = wrong.map(|r| 100.0 * r.final_distance_m).collect();
         assert!(off_cm.iter().any(|cm| (5.0..15.0).contains(cm)), "a claim off by little counts, too: {off_cm:?}");
-        assert_eq!(worst.wrong_claims, off_cm.len());
+        assert_eq!(worst.tally.wrong_claims, off_cm.len());
     }
 
     #[test]
@@ -261,21 +234,21 @@ mod tests {
         let axes = [Axis::Hidden, Axis::FalseMatches];
         let count = std::sync::atomic::AtomicUsize::new(0);
         let study = |threads| {
-            run(&world, &setup, &axes, &(1..=3), threads, &|e| {
-                if matches!(e.event, SeedEvent::Done(_)) {
-                    count.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
-                }
-                ControlFlow::Continue(())
+            run(&world, &setup, &axes, &(1..=3), &Pool::new(threads), &|_, _| {
+                count.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
             })
             .unwrap()
         };
         let one = study(1);
         assert_eq!(count.into_inner(), 3 * batches(&axes));
         assert_eq!(one.cells.len(), 13);
-        let (best, worst) = (&one.cells[0], &one.cells[12]);
+        let (best, worst) = (&one.cells[0].tally, &one.cells[12].tally);
         assert_eq!((best.home, best.runs, best.wrong_claims), (3, 3, 0));
         assert!(worst.home <= best.home, "40 % false matches among a dozen landmarks do not help");
         // With no fault added, both axes begin with the same batch.
-        assert_eq!((best.final_distance_m, best.time_ratio), (one.cells[8].final_distance_m, one.cells[8].time_ratio));
+        assert_eq!(
+            (best.final_distance_m, best.time_ratio),
+            (one.cells[8].tally.final_distance_m, one.cells[8].tally.time_ratio)
+        );
     }
 }

@@ -69,8 +69,8 @@ fn panel(axis: Axis, cells: &[&Cell]) -> Group {
     let curve = Polyline::new().set("points", curve.join(" ")).set("fill", "none");
     group = group.add(curve.set("stroke", SUCCESS).set("stroke-width", 1.5).set("stroke-opacity", 0.5));
     for (cell, &x) in cells.iter().zip(&points) {
-        let [low, high] = cell.home_share_95;
-        let wrong = cell.wrong_claims as f64 / cell.runs.max(1) as f64;
+        let [low, high] = cell.tally.home_share_95;
+        let wrong = cell.tally.wrong_claims as f64 / cell.tally.runs.max(1) as f64;
         group = group.add(interval(x, y(low), y(high))).add(point(x, y(share(cell)))).add(cross(x, y(wrong)));
     }
     group

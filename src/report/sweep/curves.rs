@@ -4,7 +4,7 @@ use svg::node::element::{Circle, Group, Polyline};
 
 use super::heat::{WIDTH_PX, document};
 use crate::draw::chart::{FAINT_INK, INK, SERIES, line, px, text};
-use crate::study::sweep::tally::Scale;
+use crate::study::sweep::duels::Scale;
 
 /// The plot, px: left, top, right, bottom.
 const PLOT_PX: [f64; 4] = [44.0, 34.0, WIDTH_PX - 8.0, 222.0];

@@ -1,10 +1,15 @@
 //! Which figures a study has, and its tables.
 
+use serde::Serialize;
+
 use super::curves::{Curve, Unit, curves};
 use super::heat::{Cell, heat};
+use crate::storage::{csv_with, decimal};
+use crate::study::row::Ending;
 use crate::study::statistics::Paired;
-use crate::study::sweep::tally::{Duel, OTHERS, Scale, Tally, compared, duels};
+use crate::study::sweep::duels::{Duel, Scale, compared, duels};
 use crate::study::sweep::{Levels, Row, Study};
+use crate::study::tally::Tally;
 
 /// A figure: what its file is called, what it shows, and the drawing.
 pub(super) struct Figure {
@@ -57,7 +62,7 @@ impl<'a> Sums<'a> {
         if let Some(scale) = &self.compared {
             places.push((scale, level));
         }
-        Tally::of(self.at(&places))
+        Tally::of(self.at(&places).map(|row| &row.run))
     }
 
     /// The axes of the heat maps: the second of the others over the first, or the first alone.
@@ -110,13 +115,16 @@ impl<'a> Sums<'a> {
                 names.iter().enumerate().map(|(level, name)| Curve { label: name.clone(), points: points(level) }).collect()
             };
             let setting = &self.study.axes[scale.axis].setting;
-            let success = curve(|t| (t.runs > 0).then(|| [t.home_share_95[0], t.share(), t.home_share_95[1]]));
+            let success = curve(|t| (t.runs > 0).then(|| [t.home_share_95[0], t.home_share, t.home_share_95[1]]));
             figures.push(Figure {
                 name: file_name("success-by", &[setting]),
                 section: Section::Curves,
                 svg: curves("Runs that come home, 95 % Wilson", scale, Unit::Percent, &success),
             });
-            let ratio = curve(|t| if let [Some(a), Some(b), Some(c)] = t.time_ratio { Some([a, b, c]) } else { None });
+            let ratio = curve(|t| {
+                let [low, high] = t.time_ratio.quartiles;
+                Some([low?, t.time_ratio.median?, high?])
+            });
             figures.push(Figure {
                 name: file_name("time-ratio-by", &[setting]),
                 section: Section::Curves,
@@ -161,66 +169,47 @@ impl<'a> Sums<'a> {
     pub fn cells_csv(&self) -> String {
         let mut scales: Vec<&Scale> = self.others.iter().take(2).collect();
         scales.extend(&self.compared);
-        let mut text: Vec<String> = scales.iter().map(|scale| quoted(&self.study.axes[scale.axis].setting)).collect();
-        text.extend(
-            ["runs", "home", "home_share", "home_share_low_95", "home_share_high_95", "wrong_claims"].map(str::to_owned),
-        );
-        text.extend(OTHERS.map(str::to_owned));
-        let tail = ["collided", "time_ratio_q25", "time_ratio_median", "time_ratio_q75", "final_distance_median_m"];
-        text.extend(tail.map(str::to_owned));
-        let mut text = text.join(",") + "\n";
-        let number = |value: Option<f64>| value.map_or_else(String::new, |v| v.to_string());
-        for levels in combinations(&scales) {
-            let places: Vec<(&Scale, usize)> = scales.iter().copied().zip(levels).collect();
-            let t = Tally::of(self.at(&places));
-            let mut cells: Vec<String> = places.iter().map(|(scale, level)| quoted(&scale.levels[*level])).collect();
-            cells.extend([t.runs, t.home].map(|n| n.to_string()));
-            cells.extend([t.share(), t.home_share_95[0], t.home_share_95[1]].map(|v| v.to_string()));
-            cells.push(t.wrong_claims.to_string());
-            cells.extend(t.others.map(|n| n.to_string()));
-            cells.push(t.collided.to_string());
-            cells.extend(t.time_ratio.map(number));
-            cells.push(number(t.final_distance_m));
-            text += &(cells.join(",") + "\n");
-        }
-        text
+        let rows: Vec<_> = combinations(&scales)
+            .into_iter()
+            .map(|levels| {
+                let places: Vec<(&Scale, usize)> = scales.iter().copied().zip(levels).collect();
+                (labels(&places), CellRow::of(&Tally::of(self.at(&places).map(|row| &row.run))))
+            })
+            .collect();
+        csv_with(&self.settings(&scales), &rows)
     }
 
     /// One row for every two of the compared ones and cell, and one for all cells together.
     pub fn pairs_csv(&self) -> String {
         let scales: Vec<&Scale> = self.others.iter().take(2).collect();
-        let mut head: Vec<String> = ["first", "second"].map(str::to_owned).to_vec();
-        head.extend(scales.iter().map(|scale| quoted(&self.study.axes[scale.axis].setting)));
-        let counts = ["pairs", "both", "only_first", "only_second", "neither"];
-        head.extend(counts.iter().chain(&["difference", "low_95", "high_95", "mcnemar_mid_p"]).map(|s| (*s).to_owned()));
-        let mut text = head.join(",") + "\n";
         let names = self.names();
+        let mut rows = Vec::new();
         for duel in &self.duels {
-            let mut add = |levels: Vec<String>, pairs: Paired, [low, high]: [f64; 2]| {
-                let mut cells: Vec<String> = duel.levels.iter().map(|level| quoted(&names[*level])).collect();
-                cells.extend(levels);
-                let counts = [pairs.trials(), pairs.both, pairs.only_first, pairs.only_second, pairs.neither];
-                cells.extend(counts.map(|n| n.to_string()));
-                cells.extend([pairs.difference(), low, high, pairs.mid_p()].map(|v| v.to_string()));
-                text += &(cells.join(",") + "\n");
+            let mut add = |levels: Vec<String>, pairs: Paired, interval: [f64; 2]| {
+                let two = duel.levels.iter().map(|level| names[*level].clone());
+                rows.push((two.chain(levels).collect(), PairRow::of(&pairs, interval)));
             };
             let bootstrap = duel.success.map_or([-1.0, 1.0], |(_, interval)| interval);
             add(vec!["all".to_owned(); scales.len()], duel.all, bootstrap);
             for levels in combinations(&scales) {
                 let places: Vec<(&Scale, usize)> = scales.iter().copied().zip(levels).collect();
                 let pairs = self.pairs_at(duel, &places);
-                let labels = places.iter().map(|(scale, level)| quoted(&scale.levels[*level])).collect();
-                add(labels, pairs, pairs.difference_95());
+                add(labels(&places), pairs, pairs.difference_95());
             }
         }
-        text
+        csv_with(&[&["first", "second"], &self.settings(&scales)[..]].concat(), &rows)
+    }
+
+    /// Settings of the scales' axes.
+    fn settings(&self, scales: &[&Scale]) -> Vec<&str> {
+        scales.iter().map(|scale| self.study.axes[scale.axis].setting.as_str()).collect()
     }
 
     /// All rows that came to nothing, panics and errors, with their reasons, and how often each came.
     pub fn broken(&self) -> Vec<(String, usize)> {
         let mut counts: std::collections::BTreeMap<&str, usize> = std::collections::BTreeMap::new();
-        for row in self.rows.iter().filter(|row| OTHERS[3..].contains(&row.outcome.as_str())) {
-            *counts.entry(&row.reason).or_default() += 1;
+        for row in self.rows.iter().filter(|row| matches!(row.run.outcome, Ending::Panic | Ending::Error)) {
+            *counts.entry(&row.run.reason).or_default() += 1;
         }
         counts.into_iter().map(|(reason, count)| (reason.to_owned(), count)).collect()
     }
@@ -234,8 +223,8 @@ impl<'a> Sums<'a> {
 fn success_cell(tally: &Tally) -> Option<Cell> {
     let [low, high] = tally.home_share_95;
     (tally.runs > 0).then(|| Cell {
-        colour: tally.share(),
-        number: format!("{:.0}", 100.0 * tally.share()),
+        colour: tally.home_share,
+        number: format!("{:.0}", 100.0 * tally.home_share),
         interval: format!("{:.0}\u{2013}{:.0}", 100.0 * low, 100.0 * high),
         told: format!("{} of {} came home; {} claimed to wrongly", tally.home, tally.runs, tally.wrong_claims),
         framed: false,
@@ -258,7 +247,87 @@ fn file_name(kind: &str, words: &[&str]) -> String {
     name.chars().map(harmless).collect::<String>() + ".svg"
 }
 
-/// A cell of CSV (RFC 4180).
-fn quoted(cell: &str) -> String {
-    if cell.contains([',', '"', '\n']) { format!("\"{}\"", cell.replace('"', "\"\"")) } else { cell.to_owned() }
+/// What figures call the levels.
+fn labels(places: &[(&Scale, usize)]) -> Vec<String> {
+    places.iter().map(|(scale, level)| scale.levels[*level].clone()).collect()
+}
+
+/// A row of `cells.csv`, after its levels.
+#[derive(Serialize)]
+struct CellRow {
+    runs: usize,
+    home: usize,
+    #[serde(serialize_with = "decimal")]
+    home_share: f64,
+    #[serde(serialize_with = "decimal")]
+    home_share_low_95: f64,
+    #[serde(serialize_with = "decimal")]
+    home_share_high_95: f64,
+    wrong_claims: usize,
+    timeout: usize,
+    lost: usize,
+    stuck: usize,
+    failed: usize,
+    panic: usize,
+    error: usize,
+    collided: usize,
+    #[serde(serialize_with = "decimal")]
+    time_ratio_q25: Option<f64>,
+    #[serde(serialize_with = "decimal")]
+    time_ratio_median: Option<f64>,
+    #[serde(serialize_with = "decimal")]
+    time_ratio_q75: Option<f64>,
+    #[serde(serialize_with = "decimal")]
+    final_distance_median_m: Option<f64>,
+}
+
+impl CellRow {
+    fn of(t: &Tally) -> Self {
+        let ([low, high], [q25, q75], counts) = (t.home_share_95, t.time_ratio.quartiles, t.outcomes);
+        Self {
+            runs: t.runs,
+            home: t.home,
+            home_share: t.home_share,
+            home_share_low_95: low,
+            home_share_high_95: high,
+            wrong_claims: t.wrong_claims,
+            timeout: counts.timeout,
+            lost: counts.lost,
+            stuck: counts.stuck,
+            failed: counts.failed,
+            panic: counts.panic,
+            error: counts.error,
+            collided: t.runs_with_collisions,
+            time_ratio_q25: q25,
+            time_ratio_median: t.time_ratio.median,
+            time_ratio_q75: q75,
+            final_distance_median_m: t.final_distance_m.median,
+        }
+    }
+}
+
+/// A row of `pairs.csv`, after the two and their levels.
+#[derive(Serialize)]
+struct PairRow {
+    pairs: usize,
+    both: usize,
+    only_first: usize,
+    only_second: usize,
+    neither: usize,
+    #[serde(serialize_with = "decimal")]
+    difference: f64,
+    #[serde(serialize_with = "decimal")]
+    low_95: f64,
+    #[serde(serialize_with = "decimal")]
+    high_95: f64,
+    #[serde(serialize_with = "decimal")]
+    mcnemar_mid_p: f64,
+}
+
+impl PairRow {
+    fn of(pairs: &Paired, [low_95, high_95]: [f64; 2]) -> Self {
+        let Paired { both, only_first, only_second, neither } = *pairs;
+        let (difference, mcnemar_mid_p) = (pairs.difference(), pairs.mid_p());
+        Self { pairs: pairs.trials(), both, only_first, only_second, neither, difference, low_95, high_95, mcnemar_mid_p }
+    }
 }

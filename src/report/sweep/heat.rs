@@ -4,7 +4,7 @@ use svg::Document;
 use svg::node::element::{Group, Title};
 
 use crate::draw::chart::{FAINT_INK, INK, line, px, rectangle, text};
-use crate::study::sweep::tally::Scale;
+use crate::study::sweep::duels::Scale;
 
 /// Width of a figure, px: that of a phone, where it is shown as it is; on a desk several stand side by side.
 pub(super) const WIDTH_PX: f64 = 360.0;

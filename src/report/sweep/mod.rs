@@ -11,8 +11,8 @@ use std::path::Path;
 
 use crate::error::Result;
 use crate::storage::OutputFolder;
+use crate::study::sweep::duels;
 use crate::study::sweep::store::StudyFolder;
-use crate::study::sweep::tally;
 use figures::Sums;
 use page::Page;
 
@@ -31,7 +31,7 @@ pub fn write(folder: &StudyFolder, out: &Path, watch: &mut dyn FnMut() -> Contro
     let figures = sums.figures();
     let mut report = OutputFolder::open(out, "sweep report", &["index.html", "cells.csv", "pairs.csv", "README.md", "*.svg"])?;
     let (mut exhibits, mut withheld) = (Vec::new(), 0);
-    for row in tally::failures(study, &rows, EXHIBITS) {
+    for row in duels::failures(study, &rows, EXHIBITS) {
         if watch().is_break() {
             return Err(crate::error::Error::Interrupted);
         }

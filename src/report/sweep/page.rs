@@ -5,8 +5,8 @@ use std::fmt::Write;
 use super::figures::{Figure, Section, Sums};
 use super::gallery::{Exhibit, data_uri};
 use crate::study::sweep::store::Rate;
-use crate::study::sweep::tally::{OTHERS, Tally};
 use crate::study::sweep::{Design, Row};
+use crate::study::tally::{OutcomeCounts, Tally};
 
 const STYLE: &str = "
 :root{color-scheme:light}
@@ -71,7 +71,7 @@ impl Page<'_> {
     }
 
     fn numbers(&self, text: &mut String) {
-        let all = Tally::of(self.sums.rows.iter());
+        let all = Tally::of(self.sums.rows.iter().map(|row| &row.run));
         let [low, high] = all.home_share_95;
         *text += "<div class=\"numbers\">\n";
         let mut add = |number: String, words: &str| {
@@ -80,10 +80,10 @@ impl Page<'_> {
         add(all.runs.to_string(), "episodes");
         add(self.sums.study.cells().to_string(), "cells");
         add(self.sums.study.episodes_per_cell().to_string(), "seeds in each");
-        let share = format!("{:.1} %", 100.0 * all.share());
+        let share = format!("{:.1} %", 100.0 * all.home_share);
         add(share, &format!("came home (95 %: {:.1} to {:.1})", 100.0 * low, 100.0 * high));
         add(all.wrong_claims.to_string(), "claimed to be home, outside the arrival radius");
-        add((all.others[3] + all.others[4]).to_string(), "panics and errors");
+        add((all.outcomes.panic + all.outcomes.error).to_string(), "panics and errors");
         *text += "</div>\n";
     }
 
@@ -100,32 +100,33 @@ impl Page<'_> {
         self.section(text, Section::Success, "Who comes home", &words);
         let names = self.sums.names();
         *text += "<div class=\"scroll\"><table>\n<tr><th></th><th>runs</th><th>home</th><th>95 %</th><th>wrong claims</th>";
-        for other in OTHERS {
+        for (other, _) in OutcomeCounts::default().others() {
             let _ = write!(text, "<th>{other}</th>");
         }
         *text += "<th>time ratio</th><th>final distance</th></tr>\n";
         for (level, name) in names.iter().enumerate() {
             let rows = self.sums.rows.iter();
             let scale = self.sums.compared.as_ref();
-            let t = Tally::of(rows.filter(|row| scale.is_none_or(|scale| scale.level(self.sums.study, row) == level)));
+            let rows = rows.filter(|row| scale.is_none_or(|scale| scale.level(self.sums.study, row) == level));
+            let t = Tally::of(rows.map(|row| &row.run));
             let [low, high] = t.home_share_95;
             let _ = write!(
                 text,
                 "<tr><td>{}</td><td>{}</td><td>{:.1} %</td><td>{:.1}\u{2013}{:.1}</td><td>{}</td>",
                 escaped(if name.is_empty() { "all" } else { name }),
                 t.runs,
-                100.0 * t.share(),
+                100.0 * t.home_share,
                 100.0 * low,
                 100.0 * high,
                 t.wrong_claims
             );
-            for other in t.others {
+            for (_, other) in t.outcomes.others() {
                 let _ = write!(text, "<td>{other}</td>");
             }
             let number = |v: Option<f64>, scale: f64, unit: &str| {
                 v.map_or_else(|| "\u{2013}".to_owned(), |v| format!("{:.2}{unit}", scale * v))
             };
-            let (ratio, last) = (number(t.time_ratio[1], 1.0, ""), number(t.final_distance_m, 100.0, " cm"));
+            let (ratio, last) = (number(t.time_ratio.median, 1.0, ""), number(t.final_distance_m.median, 100.0, " cm"));
             let _ = writeln!(text, "<td>{ratio}</td><td>{last}</td></tr>");
         }
         *text += "</table></div>\n<p class=\"faint\">Time ratio is time over straight-line time, the median of the runs that came \
@@ -219,8 +220,8 @@ impl Page<'_> {
             let _ = writeln!(
                 text,
                 "<figcaption><b>{}</b>: {}<br>{}<br><code>wayhome home --replay {}:{}</code></figcaption></figure>",
-                escaped(&row.outcome),
-                escaped(&row.reason),
+                row.run.outcome,
+                escaped(&row.run.reason),
                 escaped(&self.place(row)),
                 escaped(&self.folder),
                 row.episode
@@ -248,7 +249,7 @@ impl Page<'_> {
     fn place(&self, row: &Row) -> String {
         let mut words: Vec<String> =
             self.sums.study.axes.iter().zip(row.values.iter()).map(|(axis, value)| format!("{} {value}", axis.label)).collect();
-        words.push(format!("seed {}", row.seed));
+        words.push(format!("seed {}", row.run.seed));
         words.join(", ")
     }
 
@@ -268,7 +269,7 @@ impl Page<'_> {
                 },
             ),
         ];
-        let mut renderers: Vec<&str> = self.sums.rows.iter().filter_map(|row| row.renderer.as_deref()).collect();
+        let mut renderers: Vec<&str> = self.sums.rows.iter().filter_map(|row| row.run.renderer.as_deref()).collect();
         renderers.sort_unstable();
         renderers.dedup();
         rows.push(("renderer", if renderers.is_empty() { "none".to_owned() } else { escaped(&renderers.join(", ")) }));

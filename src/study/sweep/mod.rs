@@ -3,16 +3,16 @@
 //! A [`Study`] is read from a file and checked as a whole: settings that all episodes share, axes whose levels make
 //! cells ([`Design`]), and seeds, the same ones in every cell. Its episodes are numbered; what an episode does follows from its
 //! number alone. [`run()`] takes chunks of them, in parallel and in any order, and hands out [`Row`]s; [`merge`] puts the rows of
-//! all chunks into one table, whose bytes depend on the study alone. [`tally`] counts what the rows say.
+//! all chunks into one table, whose bytes depend on the study alone. [`duels`] holds levels side by side.
 
 mod design;
+pub mod duels;
 pub mod merge;
 pub mod rows;
 mod run;
 pub mod settings;
 mod spec;
 pub mod store;
-pub mod tally;
 mod value;
 
 pub use design::{Design, SOBOL_AXES};

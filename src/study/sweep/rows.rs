@@ -4,150 +4,61 @@ use std::sync::Arc;
 
 use super::spec::{Levels, Study};
 use super::value::Value;
-use crate::episode::{Outcome, Summary};
+use crate::episode::Summary;
+use crate::study::row::{Ending, RunRow};
 use crate::table::{Cells, Table};
 
-/// Outcome of a row whose episode ended the program's thread.
-pub const PANIC: &str = "panic";
-/// Outcome of a row whose episode could not be run.
-pub const ERROR: &str = "error";
-
-/// Real numbers of a row: column and where they come from.
-type Measure = (&'static str, fn(&Summary) -> Option<f64>);
-
-/// All real numbers of a row, in the order of the table's columns.
-const MEASURES: [Measure; 21] = [
-    ("final_distance_m", |s| Some(s.final_distance_m)),
-    ("final_heading_error_rad", |s| Some(s.final_heading_error_rad)),
-    ("time_s", |s| Some(s.time_s)),
-    ("straight_line_time_s", |s| s.straight_line_time_s),
-    ("time_ratio", |s| s.time_ratio),
-    ("path_length_m", |s| Some(s.path_length_m)),
-    ("initial_distance_m", |s| Some(s.start_distance_m)),
-    ("start_x_m", |s| Some(s.start.x_m)),
-    ("start_y_m", |s| Some(s.start.y_m)),
-    ("start_heading_rad", |s| Some(s.start.heading_rad)),
-    ("odometry_drift_m", |s| Some(s.odometry_drift_m)),
-    ("range_error_m", |s| Some(s.estimate?.range_error_m)),
-    ("bearing_error_rad", |s| Some(s.estimate?.bearing_error_rad)),
-    ("heading_error_rad", |s| Some(s.estimate?.heading_error_rad)),
-    ("range_rmse_m", |s| Some(s.estimate?.range_rmse_m)),
-    ("bearing_rmse_rad", |s| Some(s.estimate?.bearing_rmse_rad)),
-    ("heading_rmse_rad", |s| Some(s.estimate?.heading_rmse_rad)),
-    ("nees", |s| s.estimate?.nees),
-    ("seen_mean", |s| Some(s.landmarks.seen_mean)),
-    ("matched_mean", |s| Some(s.landmarks.matched_mean)),
-    ("rejected_mean", |s| Some(s.landmarks.rejected_mean)),
-];
-/// A whole number of a summary.
-type Count = fn(&Summary) -> usize;
-/// Whole numbers of a row.
-const COUNTS: [(&str, Count); 3] =
-    [("collisions", |s| s.collisions), ("home_landmarks", |s| s.landmarks.home), ("steps", |s| s.steps)];
-
-/// One episode.
+/// One episode of a study.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Row {
     /// Its number in the study, from 0.
     pub episode: u64,
     /// Its cell.
     pub cell: u64,
-    /// Its seed.
-    pub seed: u64,
     /// The values of the study's axes.
     pub values: Arc<[Value]>,
-    /// `home`, `timeout`, `lost`, `stuck`, [`PANIC`] or [`ERROR`].
-    pub outcome: String,
-    /// Why it did not end at home; empty where it did.
-    pub reason: String,
-    /// Whether the method claimed to be home, rightly or not.
-    pub claimed_home: Option<bool>,
-    /// What rendered: `cpu` or `gpu`.
-    pub renderer: Option<String>,
-    counts: [Option<i64>; COUNTS.len()],
-    measures: [Option<f64>; MEASURES.len()],
+    /// What its run says.
+    pub run: RunRow,
 }
 
 impl Row {
     /// The row of an episode that ran.
     #[must_use]
     pub fn of(episode: u64, cell: u64, values: &Arc<[Value]>, summary: &Summary) -> Self {
-        let reason = match summary.outcome {
-            Outcome::Home => String::new(),
-            Outcome::Timeout => format!("{:.1} m from home at the time limit", summary.final_distance_m),
-            Outcome::Lost if summary.claimed_home => {
-                format!("claimed to be home {:.1} cm from it", 100.0 * summary.final_distance_m)
-            }
-            Outcome::Lost => "the method gave up".to_owned(),
-            Outcome::Stuck => match summary.collision_list.last() {
-                Some(hit) => format!("did not move although told to; last ran into {}", hit.with),
-                None => "did not move although told to".to_owned(),
-            },
-            Outcome::Failed => summary.failure.clone().unwrap_or_else(|| "the method failed".to_owned()),
-        };
-        let finite = |value: Option<f64>| value.filter(|v| v.is_finite());
-        Self {
-            episode,
-            cell,
-            seed: summary.seed,
-            values: Arc::clone(values),
-            outcome: summary.outcome.name().to_owned(),
-            reason,
-            claimed_home: Some(summary.claimed_home),
-            renderer: summary.renderer.as_ref().map(|r| r.kind.clone()),
-            counts: COUNTS.map(|(_, of)| Some(of(summary) as i64)),
-            measures: MEASURES.map(|(_, of)| finite(of(summary))),
-        }
-    }
-
-    /// The row of an episode that has no result: `outcome` is [`PANIC`] or [`ERROR`].
-    #[must_use]
-    pub fn without_result(
-        episode: u64,
-        (cell, seed): (u64, u64),
-        values: &Arc<[Value]>,
-        outcome: &str,
-        reason: String,
-    ) -> Self {
-        Self {
-            episode,
-            cell,
-            seed,
-            values: Arc::clone(values),
-            outcome: outcome.to_owned(),
-            reason,
-            claimed_home: None,
-            renderer: None,
-            counts: [None; COUNTS.len()],
-            measures: [None; MEASURES.len()],
-        }
-    }
-
-    /// Whether the robot came home.
-    #[must_use]
-    pub fn is_home(&self) -> bool {
-        self.outcome == Outcome::Home.name()
-    }
-
-    /// Whether the method claimed to be home and the robot came to rest outside the arrival radius, as
-    /// [`Summary::is_wrong_claim`].
-    #[must_use]
-    pub fn is_wrong_claim(&self) -> bool {
-        self.claimed_home == Some(true) && !self.is_home()
-    }
-
-    /// The number in a column of whole numbers.
-    #[must_use]
-    pub fn count(&self, column: &str) -> Option<i64> {
-        COUNTS.iter().position(|(name, _)| *name == column).and_then(|k| self.counts[k])
-    }
-
-    /// The number in a column of real numbers.
-    #[must_use]
-    pub fn measure(&self, column: &str) -> Option<f64> {
-        MEASURES.iter().position(|(name, _)| *name == column).and_then(|k| self.measures[k])
+        Self { episode, cell, values: Arc::clone(values), run: summary.into() }
     }
 }
+
+/// A number of a run, to be read or set.
+type Field<T> = fn(&mut RunRow) -> &mut Option<T>;
+
+/// Real numbers of a run, by column and in the table's order.
+const REALS: [(&str, Field<f64>); 21] = [
+    ("final_distance_m", |r| &mut r.final_distance_m),
+    ("final_heading_error_rad", |r| &mut r.final_heading_error_rad),
+    ("time_s", |r| &mut r.time_s),
+    ("straight_line_time_s", |r| &mut r.straight_line_time_s),
+    ("time_ratio", |r| &mut r.time_ratio),
+    ("path_length_m", |r| &mut r.path_length_m),
+    ("initial_distance_m", |r| &mut r.start_distance_m),
+    ("start_x_m", |r| &mut r.start_x_m),
+    ("start_y_m", |r| &mut r.start_y_m),
+    ("start_heading_rad", |r| &mut r.start_heading_rad),
+    ("odometry_drift_m", |r| &mut r.odometry_drift_m),
+    ("range_error_m", |r| &mut r.range_error_m),
+    ("bearing_error_rad", |r| &mut r.bearing_error_rad),
+    ("heading_error_rad", |r| &mut r.heading_error_rad),
+    ("range_rmse_m", |r| &mut r.range_rmse_m),
+    ("bearing_rmse_rad", |r| &mut r.bearing_rmse_rad),
+    ("heading_rmse_rad", |r| &mut r.heading_rmse_rad),
+    ("nees", |r| &mut r.nees),
+    ("seen_mean", |r| &mut r.seen_mean),
+    ("matched_mean", |r| &mut r.matched_mean),
+    ("rejected_mean", |r| &mut r.rejected_mean),
+];
+/// Whole numbers of a run, likewise.
+const INTS: [(&str, Field<i64>); 3] =
+    [("collisions", |r| &mut r.collisions), ("home_landmarks", |r| &mut r.home_landmarks), ("steps", |r| &mut r.steps)];
 
 /// The rows as a table: where they belong, the axes' values, how they ended, and in numbers.
 #[must_use]
@@ -155,7 +66,7 @@ pub fn table(study: &Study, rows: &[Row]) -> Table {
     let mut table = Table::default()
         .ints("episode", rows.iter().map(|r| r.episode as i64))
         .ints("cell", rows.iter().map(|r| r.cell as i64))
-        .ints("seed", rows.iter().map(|r| r.seed as i64));
+        .ints("seed", rows.iter().map(|r| r.run.seed as i64));
     for (k, axis) in study.axes.iter().enumerate() {
         let (name, values) = (&axis.setting, rows.iter().map(|r| &r.values[k]));
         let all = |fits: fn(&Value) -> bool| match &axis.levels {
@@ -173,18 +84,19 @@ pub fn table(study: &Study, rows: &[Row]) -> Table {
             table.texts(name, values.map(Value::to_string))
         };
     }
+    let mut runs: Vec<RunRow> = rows.iter().map(|r| r.run.clone()).collect();
     table = table
-        .texts("outcome", rows.iter().map(|r| r.outcome.clone()))
-        .texts("reason", rows.iter().map(|r| r.reason.clone()))
-        .bools("claimed_home", rows.iter().map(|r| r.claimed_home))
-        .bools("wrong_claim", rows.iter().map(Row::is_wrong_claim));
-    for (k, (name, _)) in MEASURES.iter().enumerate() {
-        table = table.reals(name, rows.iter().map(|r| r.measures[k]));
+        .texts("outcome", runs.iter().map(|r| r.outcome.to_string()))
+        .texts("reason", runs.iter().map(|r| r.reason.clone()))
+        .bools("claimed_home", runs.iter().map(|r| r.claimed_home))
+        .bools("wrong_claim", runs.iter().map(RunRow::is_wrong_claim));
+    for (name, field) in REALS {
+        table = table.reals(name, runs.iter_mut().map(|r| *field(r)));
     }
-    for (k, (name, _)) in COUNTS.iter().enumerate() {
-        table = table.ints(name, rows.iter().map(|r| r.counts[k]));
+    for (name, field) in INTS {
+        table = table.ints(name, runs.iter_mut().map(|r| *field(r)));
     }
-    table.texts("renderer", rows.iter().map(|r| r.renderer.clone()))
+    table.texts("renderer", runs.into_iter().map(|r| r.renderer))
 }
 
 /// The rows of a table that [`table`] made of the same study.
@@ -197,39 +109,67 @@ pub fn from_table(study: &Study, table: &Table) -> Result<Vec<Row>, String> {
         Some(Cells::Int(cells)) => Ok(cells),
         _ => Err(unfit(name)),
     };
-    let reals = |name: &str| match table.column(name) {
-        Some(Cells::Real(cells)) => Ok(cells),
-        _ => Err(unfit(name)),
-    };
     let texts = |name: &str| match table.column(name) {
         Some(Cells::Text(cells)) => Ok(cells),
         _ => Err(unfit(name)),
     };
     let Some(Cells::Bool(claims)) = table.column("claimed_home") else { return Err(unfit("claimed_home")) };
-    let (episodes, outcomes, reasons, renderers) = (ints("episode")?, texts("outcome")?, texts("reason")?, texts("renderer")?);
-    let counts = COUNTS.iter().map(|(name, _)| ints(name)).collect::<Result<Vec<_>, _>>()?;
-    let measures = MEASURES.iter().map(|(name, _)| reals(name)).collect::<Result<Vec<_>, _>>()?;
+    let (outcomes, reasons, renderers) = (texts("outcome")?, texts("reason")?, texts("renderer")?);
     let mut values: (u64, Arc<[Value]>) = (u64::MAX, Arc::new([]));
-    let mut rows = Vec::with_capacity(episodes.len());
-    for (k, episode) in episodes.iter().enumerate() {
+    let mut rows = Vec::with_capacity(table.rows());
+    for (k, episode) in ints("episode")?.iter().enumerate() {
         let episode = episode.and_then(|n| u64::try_from(n).ok()).filter(|n| *n < study.episodes());
         let episode = episode.ok_or_else(|| format!("row {k}: an episode that the study does not have"))?;
         let (cell, seed) = study.place(episode);
         if values.0 != cell {
             values = (cell, study.values(cell).into());
         }
-        rows.push(Row {
-            episode,
-            cell,
+        let outcome = outcomes[k].as_deref().unwrap_or_default();
+        let run = RunRow {
             seed,
-            values: Arc::clone(&values.1),
-            outcome: outcomes[k].clone().unwrap_or_default(),
+            outcome: outcome.parse().map_err(|_| format!("row {k}: an outcome `{outcome}`, which there is not"))?,
             reason: reasons[k].clone().unwrap_or_default(),
             claimed_home: claims[k],
             renderer: renderers[k].clone(),
-            counts: std::array::from_fn(|c| counts[c][k]),
-            measures: std::array::from_fn(|m| measures[m][k]),
-        });
+            ..RunRow::default()
+        };
+        rows.push(Row { episode, cell, values: Arc::clone(&values.1), run });
+    }
+    for (name, field) in REALS {
+        let Some(Cells::Real(cells)) = table.column(name) else { return Err(unfit(name)) };
+        rows.iter_mut().zip(cells).for_each(|(row, cell)| *field(&mut row.run) = *cell);
+    }
+    for (name, field) in INTS {
+        rows.iter_mut().zip(ints(name)?).for_each(|(row, cell)| *field(&mut row.run) = *cell);
     }
     Ok(rows)
+}
+
+/// The row of an episode that has no result, and why.
+#[must_use]
+pub fn without_result(episode: u64, (cell, seed): (u64, u64), values: &Arc<[Value]>, outcome: Ending, reason: String) -> Row {
+    Row { episode, cell, values: Arc::clone(values), run: RunRow { seed, outcome, reason, ..RunRow::default() } }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::path::Path;
+
+    #[test]
+    fn every_number_of_a_run_comes_back_from_the_table() {
+        let text =
+            "name = \"t\"\nworld = \"lab\"\nseeds = \"1..2\"\n[[axes]]\nsetting = \"hidden_share\"\nvalues = [0.0, 0.5]\n";
+        let study = Study::from_toml(text, Path::new("t.toml"), None).unwrap();
+        let world = crate::world::World::open("lab").unwrap();
+        let (sensor, time_limit_s) = (crate::episode::SensorKind::Noisy, Some(3.0));
+        let setup = crate::episode::Setup { sensor, time_limit_s, ..Default::default() };
+        let pool = crate::study::pool::Pool::new(1);
+        let summaries = crate::study::seeds::run_seeds(&world, &setup, 1..=2, &pool, &|_| ()).unwrap();
+        let row = |(k, summary)| Row::of(k, 0, &study.values(0).into(), summary);
+        let mut rows: Vec<Row> = (0..).zip(&summaries).map(row).collect();
+        rows.push(without_result(2, (1, 1), &study.values(1).into(), Ending::Panic, "wheel off".into()));
+        assert!(rows[0].run.range_rmse_m.is_some() && !rows[0].run.reason.is_empty(), "{:?}", rows[0]);
+        assert_eq!(from_table(&study, &table(&study, &rows)).unwrap(), rows);
+    }
 }

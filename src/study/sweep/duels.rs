@@ -1,13 +1,11 @@
-//! Counting what the rows of a study say.
+//! Levels of a study's axes side by side: classes of them, pairs of runs that differ in one alone, failures worth a look.
 
 use std::collections::BTreeMap;
 
-use serde::Serialize;
-
-use super::rows::{ERROR, PANIC, Row};
+use super::rows::Row;
 use super::spec::{Axis, Levels, Study};
-use crate::episode::Outcome;
-use crate::study::statistics::{Paired, cluster_bootstrap_95, quantile, wilson_95};
+use crate::study::row::Ending;
+use crate::study::statistics::{Paired, cluster_bootstrap_95};
 
 /// Classes that the range of a sampled axis is cut into.
 const CLASSES: usize = 6;
@@ -71,58 +69,6 @@ fn short(value: f64) -> String {
     if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
 }
 
-/// Some rows in numbers.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Tally {
-    /// Episodes.
-    pub runs: usize,
-    /// Those that came home.
-    pub home: usize,
-    /// 95 % Wilson interval of their share.
-    pub home_share_95: [f64; 2],
-    /// Those that claimed to be home and came to rest outside the arrival radius.
-    pub wrong_claims: usize,
-    /// Those that ended otherwise: timeout, lost, stuck, panic, error.
-    pub others: [usize; 5],
-    /// Quartiles of time over straight-line time, of those that came home.
-    pub time_ratio: [Option<f64>; 3],
-    /// Median distance from home at the end, m.
-    pub final_distance_m: Option<f64>,
-    /// Episodes with a collision.
-    pub collided: usize,
-}
-
-/// Names of [`Tally::others`].
-pub const OTHERS: [&str; 5] = ["timeout", "lost", "stuck", PANIC, ERROR];
-
-impl Tally {
-    /// Of these rows.
-    #[must_use]
-    pub fn of<'a>(rows: impl Iterator<Item = &'a Row> + Clone) -> Self {
-        let count = |holds: &dyn Fn(&Row) -> bool| rows.clone().filter(|row| holds(row)).count();
-        let runs = rows.clone().count();
-        let home = count(&Row::is_home);
-        let ratios: Vec<f64> = rows.clone().filter_map(|row| row.measure("time_ratio")).collect();
-        let finals: Vec<f64> = rows.clone().filter_map(|row| row.measure("final_distance_m")).collect();
-        Self {
-            runs,
-            home,
-            home_share_95: wilson_95(home, runs),
-            wrong_claims: count(&Row::is_wrong_claim),
-            others: OTHERS.map(|name| count(&|row| row.outcome == name)),
-            time_ratio: [0.25, 0.5, 0.75].map(|share| quantile(&ratios, share)),
-            final_distance_m: quantile(&finals, 0.5),
-            collided: count(&|row| row.count("collisions").is_some_and(|n| n > 0)),
-        }
-    }
-
-    /// Share that came home.
-    #[must_use]
-    pub fn share(&self) -> f64 {
-        self.home as f64 / self.runs.max(1) as f64
-    }
-}
-
 /// Two levels of the compared axis, seed by seed.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Duel {
@@ -160,7 +106,7 @@ pub fn duels(study: &Study, rows: &[Row]) -> Vec<Duel> {
     let mut pairs: BTreeMap<(u64, u64), Vec<Option<&Row>>> = BTreeMap::new();
     for row in rows {
         let level = scale.level(study, row);
-        let key = (row.cell - level as u64 * stride, row.seed);
+        let key = (row.cell - level as u64 * stride, row.run.seed);
         pairs.entry(key).or_insert_with(|| vec![None; scale.levels.len()])[level] = Some(row);
     }
     let count = scale.levels.len();
@@ -177,11 +123,11 @@ impl Duel {
         let mut kept = Vec::new();
         for (&(cell, seed), rows) in pairs {
             let (Some(a), Some(b)) = (rows[levels[0]], rows[levels[1]]) else { continue };
-            all.add(a.is_home(), b.is_home());
-            kept.push((cell, seed, a.is_home(), b.is_home()));
+            all.add(a.run.is_home(), b.run.is_home());
+            kept.push((cell, seed, a.run.is_home(), b.run.is_home()));
             let success = successes.entry(seed).or_default();
-            *success = (success.0 + f64::from(i8::from(a.is_home()) - i8::from(b.is_home())), success.1 + 1);
-            if let (Some(x), Some(y)) = (a.measure("time_ratio"), b.measure("time_ratio")) {
+            *success = (success.0 + f64::from(i8::from(a.run.is_home()) - i8::from(b.run.is_home())), success.1 + 1);
+            if let (Some(x), Some(y)) = (a.run.time_ratio, b.run.time_ratio) {
                 let ratio = ratios.entry(seed).or_default();
                 *ratio = (ratio.0 + x - y, ratio.1 + 1);
             }
@@ -209,15 +155,15 @@ impl Duel {
 pub fn failures<'a>(study: &Study, rows: &'a [Row], most: usize) -> Vec<&'a Row> {
     let scale = compared(study).map(|axis| Scale::of(study, axis));
     let mut home_in_cell: BTreeMap<u64, usize> = BTreeMap::new();
-    for row in rows.iter().filter(|row| row.is_home()) {
+    for row in rows.iter().filter(|row| row.run.is_home()) {
         *home_in_cell.entry(row.cell).or_default() += 1;
     }
     let mut kinds: BTreeMap<(usize, usize), Vec<&Row>> = BTreeMap::new();
     for row in rows {
         let level = scale.as_ref().map_or(0, |scale| scale.level(study, row));
         // A run without a result has no path to show.
-        let shown = [Outcome::Lost, Outcome::Timeout, Outcome::Stuck];
-        if let Some(outcome) = shown.iter().position(|o| o.name() == row.outcome) {
+        let shown = [Ending::Lost, Ending::Timeout, Ending::Stuck];
+        if let Some(outcome) = shown.iter().position(|outcome| *outcome == row.run.outcome) {
             kinds.entry((outcome, level)).or_default().push(row);
         }
     }
@@ -239,6 +185,8 @@ pub fn failures<'a>(study: &Study, rows: &'a [Row], most: usize) -> Vec<&'a Row>
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::study::sweep::rows::without_result;
+    use crate::study::tally::Tally;
     use std::path::Path;
     use std::sync::Arc;
 
@@ -253,8 +201,8 @@ mod tests {
         let rows = (0..study.episodes()).map(|episode| {
             let (cell, seed) = study.place(episode);
             let values: Arc<[_]> = study.values(cell).into();
-            let outcome = if home(values[0].text().unwrap(), seed) { "home" } else { "lost" };
-            Row::without_result(episode, (cell, seed), &values, outcome, String::new())
+            let outcome = if home(values[0].text().unwrap(), seed) { Ending::Home } else { Ending::Lost };
+            without_result(episode, (cell, seed), &values, outcome, String::new())
         });
         (study.clone(), rows.collect())
     }
@@ -282,10 +230,10 @@ mod tests {
         for axis in 0..3 {
             let scale = Scale::of(&study, axis);
             let counts = (0..scale.levels.len())
-                .map(|level| Tally::of(rows.iter().filter(|row| scale.level(&study, row) == level)))
+                .map(|level| Tally::of(rows.iter().filter(|row| scale.level(&study, row) == level).map(|row| &row.run)))
                 .collect::<Vec<_>>();
             assert_eq!(counts.iter().map(|t| t.runs).sum::<usize>(), 48);
-            assert!(counts.iter().all(|t| t.runs == 2 * t.home && t.runs == t.home + t.others[1]));
+            assert!(counts.iter().all(|t| t.runs == 2 * t.home && t.runs == t.home + t.outcomes.lost));
         }
         assert_eq!(Scale::of(&study, 1).levels[0], "0.1\u{2013}0.2");
         assert_eq!(failures(&study, &rows, 7).len(), 7);
