@@ -66,6 +66,7 @@
 //! SI units; x forward, y left, angles anti-clockwise. One seed gives a run: the same bytes on any number of threads, and with
 //! the CPU renderer on any machine. That is why trigonometry goes through [`geometry`] and never through the platform.
 
+pub mod command_line;
 pub mod control;
 pub mod dataset;
 pub mod document;

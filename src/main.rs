@@ -5,13 +5,10 @@ mod cli;
 use std::io::Write;
 use std::process::ExitCode;
 
-use clap::Parser;
 use wayhome::Error;
 
 fn main() -> ExitCode {
-    // On a fault in the arguments clap explains and leaves with 2, after `--help` and `--version` with 0.
-    let args = cli::args::Args::parse();
-    match cli::run(args) {
+    match cli::run() {
         Ok(cli::Verdict::Done) => ExitCode::SUCCESS,
         Ok(cli::Verdict::NotHome) => ExitCode::from(3),
         Err(error) => {
@@ -19,7 +16,7 @@ fn main() -> ExitCode {
             let _ = writeln!(std::io::stderr(), "error: {error:#}");
             match error.downcast_ref::<Error>() {
                 Some(Error::Invalid { .. }) => ExitCode::from(2),
-                Some(Error::Interrupted) => ExitCode::from(130),
+                Some(Error::Interrupted) => ExitCode::from(cli::INTERRUPTED),
                 _ => ExitCode::FAILURE,
             }
         }

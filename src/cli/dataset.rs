@@ -2,49 +2,28 @@
 
 use std::f64::consts::PI;
 use std::fmt::Write;
-use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
-use std::sync::Mutex;
 
 use anyhow::{Result, bail};
-use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use serde::Serialize;
-use strum::EnumMessage;
 use wayhome::dataset::check::{Inspection, check};
 use wayhome::dataset::conditions::{CHANGES, Condition};
 use wayhome::dataset::pipeline::Job;
 use wayhome::dataset::plan::{Headings, Places, Plan, Request};
-use wayhome::panorama_set::{LayoutKind, Place};
+use wayhome::panorama_set::LayoutKind;
 use wayhome::render::{self, RendererChoice};
 use wayhome::report::dataset as report;
-use wayhome::sensor::DatasetChoice;
 use wayhome::storage::OutputFolder;
 use wayhome::verify::dataset as speed;
 use wayhome::world::World;
 
-use super::Verdict;
-use super::args::{RENDERERS, choice, number, positive, quoted, size};
-use super::context::{Context, default_folder};
+use super::context::{Context, Verdict, folder_or};
+use super::values::{choice, choice_of, number, pair, point, positive, shard, size};
 
 /// Shown under `dataset --help`.
-pub const HELP: &str = "A route is CSV with columns x_m, y_m and perhaps heading_deg or heading_rad. Poses at which the robot cannot stand are left out
+const HELP: &str = "A route is CSV with columns x_m, y_m and perhaps heading_deg or heading_rad. Poses at which the robot cannot stand are left out
 and listed. A set that was interrupted is gone on with by the same command. Shards may share a folder, or their folders may be
-copied over one another; the same command without --shard then completes the set.
-
-Exit codes:
-  0    done
-  1    failed: a file or a folder; or `check` found faults
-  2    usage: an argument or one of its values is not allowed
-  130  interrupted by Ctrl-C; what is there is whole";
-
-/// The layouts that are written, with the first lines of their docs as help.
-fn layouts() -> impl TypedValueParser<Value = LayoutKind> {
-    let names = LayoutKind::written().map(|kind| {
-        let about = kind.get_documentation().and_then(|text| text.lines().next()).unwrap_or_default();
-        PossibleValue::new(kind.name()).help(about.trim_end_matches('.'))
-    });
-    PossibleValuesParser::new(names).try_map(|name| name.parse::<LayoutKind>())
-}
+copied over one another; the same command without --shard then completes the set. `check` fails where it finds faults.";
 
 /// Arguments of `dataset`.
 #[derive(Debug, clap::Args)]
@@ -83,7 +62,7 @@ pub struct DatasetArgs {
     #[arg(long, value_name = "CONDITION,…", value_delimiter = ',', long_help = conditions_help())]
     pub conditions: Vec<Condition>,
     /// How files are named and coded
-    #[arg(long, default_value = "folder", value_parser = layouts())]
+    #[arg(long, default_value = "folder", value_parser = choice_of(LayoutKind::written()))]
     pub layout: LayoutKind,
     /// Columns and rows of the panorama, 16x8 to 16384x4096 [default: the world's]
     #[arg(long, value_name = "WxH", value_parser = size)]
@@ -96,9 +75,9 @@ pub struct DatasetArgs {
     pub license: String,
     /// Make share I of N of the set
     #[arg(long, value_name = "I/N", value_parser = shard)]
-    pub shard: Option<(usize, usize)>,
+    pub shard: Option<[u64; 2]>,
     /// What renders
-    #[arg(long, default_value = "auto", value_parser = choice(RENDERERS))]
+    #[arg(long, default_value = "auto", value_parser = choice::<RendererChoice>())]
     pub renderer: RendererChoice,
     /// Folder for the set [default: results/runs/dataset-WORLD-SEED]
     #[arg(long, value_name = "DIR")]
@@ -127,44 +106,6 @@ pub enum DatasetCommand {
     },
 }
 
-/// The set that `--bearings dataset` looks at.
-#[derive(Debug, Clone, clap::Args)]
-pub struct SetArgs {
-    /// Set of panoramas for `--bearings dataset`, in any layout that `dataset` writes, or a real one
-    #[arg(long, value_name = "DIR", required_if_eq("bearings", "dataset"))]
-    pub dataset: Option<PathBuf>,
-    /// Condition of the set [default: its first]
-    #[arg(long, value_name = "NAME", requires = "dataset")]
-    pub dataset_condition: Option<String>,
-    /// Condition of the home panorama, if another than on the way
-    #[arg(long, value_name = "NAME", requires = "dataset")]
-    pub dataset_home_condition: Option<String>,
-    /// Distance between places of a set that does not tell it, m
-    #[arg(long, value_name = "S", requires = "dataset", allow_negative_numbers = true, value_parser = positive)]
-    pub dataset_spacing_m: Option<f64>,
-    /// Row and column of home, from 0, of a set that does not tell it [default: the middle]
-    #[arg(long, value_name = "I,J", requires = "dataset", value_parser = place)]
-    pub dataset_home: Option<Place>,
-}
-
-impl SetArgs {
-    /// What they stand for.
-    pub fn choice(&self) -> Option<DatasetChoice> {
-        self.dataset.as_ref().map(|folder| DatasetChoice {
-            folder: folder.clone(),
-            condition: self.dataset_condition.clone(),
-            home_condition: self.dataset_home_condition.clone(),
-            spacing_m: self.dataset_spacing_m,
-            home: self.dataset_home,
-        })
-    }
-}
-
-fn place(text: &str) -> Result<Place, String> {
-    let numbers = text.split_once(',').and_then(|(i, j)| Some((i.trim().parse().ok()?, j.trim().parse().ok()?)));
-    numbers.map(|(i, j)| Place { i, j }).ok_or_else(|| "a place is I,J: its row and column, from 0".into())
-}
-
 /// Headings as the command line has them.
 #[derive(Debug, Clone, PartialEq)]
 pub struct HeadingsArg(Headings);
@@ -177,13 +118,8 @@ fn conditions_help() -> String {
 }
 
 fn grid(text: &str) -> Result<(usize, usize), String> {
-    let numbers = text.split_once('x').and_then(|(x, y)| Some((x.parse().ok()?, y.parse().ok()?)));
-    numbers.filter(|(x, y)| *x > 0 && *y > 0).ok_or_else(|| "a grid is NXxNY, such as 17x10, with at least one place".into())
-}
-
-fn point(text: &str) -> Result<[f64; 2], String> {
-    let numbers = text.split(',').map(number).collect::<Result<Vec<_>, _>>()?;
-    numbers.try_into().map_err(|_| "a point is X,Y".into())
+    let numbers = pair(text, "x").filter(|(x, y)| *x > 0 && *y > 0);
+    numbers.ok_or_else(|| "a grid is NXxNY, such as 17x10, with at least one place".into())
 }
 
 fn headings(text: &str) -> Result<HeadingsArg, String> {
@@ -204,14 +140,9 @@ fn licence(text: &str) -> Result<String, String> {
     if plain { Ok(text.to_owned()) } else { Err("an SPDX identifier has letters, digits, `-`, `.` and `+`".into()) }
 }
 
-fn shard(text: &str) -> Result<(usize, usize), String> {
-    let numbers = text.split_once('/').and_then(|(i, n)| Some((i.parse().ok()?, n.parse().ok()?)));
-    numbers.filter(|(i, n)| (1..=*n).contains(i)).ok_or_else(|| "a shard is I/N with I from 1 to N, such as 2/4".into())
-}
-
 /// What `--json` prints of a set.
 #[derive(Serialize)]
-struct Output {
+struct Made {
     frames: usize,
     rendered: usize,
     found: usize,
@@ -220,7 +151,6 @@ struct Output {
     complete: bool,
     layout: LayoutKind,
     renderer: render::RendererInfo,
-    out: String,
 }
 
 /// What `--json` prints of a check.
@@ -241,12 +171,13 @@ pub fn run(args: &DatasetArgs, context: &Context) -> Result<Verdict> {
 
 fn make(args: &DatasetArgs, context: &Context) -> Result<Verdict> {
     let world = World::open(args.world.as_deref().unwrap_or_default())?;
-    let plan = Plan::new(&world, request(args))?;
-    let out = args.out.clone().unwrap_or_else(|| default_folder(&["dataset", &world.spec.name, &args.seed.to_string()]));
+    let plan = Plan::new(&world, request(args, context))?;
+    let out = folder_or(args.out.as_deref(), &["dataset", &world.spec.name, &args.seed.to_string()]);
     let mut renderer = render::create(args.renderer)?;
     let bar = context.work(plan.frames() as u64)?;
     let mut begun = false;
-    let job = Job { plan: &plan, out: &out, shard: args.shard.unwrap_or((1, 1)), extras: &report::card };
+    let shard = args.shard.map_or((1, 1), |[i, n]| (i as usize, n as usize));
+    let job = Job { plan: &plan, out: &out, shard, extras: &report::card };
     let outcome = job.run(renderer.as_mut(), &mut |progress| {
         if !begun {
             // What is there already says nothing about the rate.
@@ -256,10 +187,10 @@ fn make(args: &DatasetArgs, context: &Context) -> Result<Verdict> {
             begun = true;
         }
         bar.set_position(progress.done as u64);
-        if context.is_stopped() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        bar.flow()
     })?;
-    bar.finish_and_clear();
-    let output = Output {
+    drop(bar);
+    let made = Made {
         frames: plan.frames(),
         rendered: outcome.rendered,
         found: outcome.found,
@@ -268,13 +199,12 @@ fn make(args: &DatasetArgs, context: &Context) -> Result<Verdict> {
         complete: outcome.complete,
         layout: args.layout,
         renderer: renderer.info().clone(),
-        out: out.display().to_string(),
     };
-    context.print(&output, || text(&output))?;
+    context.print_made(&made, &out, || text(&made, &out))?;
     Ok(Verdict::Done)
 }
 
-fn text(o: &Output) -> String {
+fn text(o: &Made, out: &Path) -> String {
     let mut text = format!("{} of {} panoramas rendered on {} ({})", o.rendered, o.frames, o.renderer.kind, o.renderer.adapter);
     if o.found > 0 {
         let _ = write!(text, ", {} were there", o.found);
@@ -283,11 +213,11 @@ fn text(o: &Output) -> String {
         let _ = write!(text, "; {} poses left out, see left-out.csv", o.left_out);
     }
     let state = if o.complete { "complete" } else { "not complete yet: other shards are missing" };
-    let _ = writeln!(text, "\nset in {} is {state}", o.out);
+    let _ = writeln!(text, "\nset in {} is {state}", out.display());
     text
 }
 
-fn request(args: &DatasetArgs) -> Request {
+fn request(args: &DatasetArgs, context: &Context) -> Request {
     let places = match (&args.grid, &args.route, &args.trajectory) {
         (Some((columns, rows)), _, _) => Places::Grid {
             columns: *columns,
@@ -308,54 +238,19 @@ fn request(args: &DatasetArgs) -> Request {
         layout: args.layout,
         seed: args.seed,
         licence: args.license.clone(),
-        command: command(args),
+        // Without what the set's bytes do not depend on; the renderer is noted by itself.
+        command: context.command_line(&["shard", "renderer", "out"]),
     }
-}
-
-/// The command, without what the set's bytes do not depend on: threads, shards, the folder.
-fn command(args: &DatasetArgs) -> String {
-    let mut text = format!("wayhome dataset {}", quoted(args.world.as_deref().unwrap_or_default()));
-    let mut flag = |name: &str, value: Option<String>| {
-        if let Some(value) = value {
-            let _ = write!(text, " --{name} {}", quoted(&value));
-        }
-    };
-    let path = |path: &Option<PathBuf>| path.as_ref().map(|p| p.display().to_string());
-    flag("grid", args.grid.map(|(x, y)| format!("{x}x{y}")));
-    flag("spacing-m", args.spacing_m.map(|s| s.to_string()));
-    flag("origin", args.origin.map(|[x, y]| format!("{x},{y}")));
-    flag("route", path(&args.route));
-    flag("random", args.random.map(|n| n.to_string()));
-    flag("trajectory", path(&args.trajectory));
-    flag(
-        "headings",
-        args.headings.as_ref().map(|h| match &h.0 {
-            Headings::Own => String::new(),
-            Headings::Random(n) => format!("random:{n}"),
-            Headings::Fixed(all) => all.iter().map(|h| (h / PI * 180.0).to_string()).collect::<Vec<_>>().join(","),
-        }),
-    );
-    let conditions: Vec<&str> = args.conditions.iter().map(Condition::given).collect();
-    flag("conditions", (!conditions.is_empty()).then(|| conditions.join(",")));
-    flag("layout", Some(args.layout.name().to_owned()));
-    flag("size", args.size.map(|(w, h)| format!("{w}x{h}")));
-    flag("seed", Some(args.seed.to_string()));
-    flag("license", Some(args.license.clone()));
-    text
 }
 
 fn inspect(dir: &Path, context: &Context) -> Result<Verdict> {
-    let bar = Mutex::new(context.work(0)?);
+    let bar = context.work(0)?;
     let found = check(dir, &|done, all| {
-        if let Ok(bar) = bar.lock() {
-            bar.set_length(all);
-            bar.set_position(done);
-        }
-        if context.is_stopped() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        bar.set_length(all);
+        bar.set_position(done);
+        bar.flow()
     })?;
-    if let Ok(bar) = bar.lock() {
-        bar.finish_and_clear();
-    }
+    drop(bar);
     let whole = found.faults.is_empty();
     context.print(&Checked { whole, inspection: &found }, || report::inspection(&found, dir))?;
     if !whole {
@@ -368,12 +263,8 @@ fn bench(world: &str, frames: usize, out: Option<&Path>, context: &Context) -> R
     let world = World::open(world)?;
     let folder = out.map(|out| OutputFolder::open(out, "dataset bench", report::FILES)).transpose()?;
     let bar = context.progress(None)?;
-    let found = speed::measure(&world, frames, &std::env::temp_dir(), &|what| {
-        bar.set_message(what.to_owned());
-        bar.tick();
-        if context.is_stopped() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-    })?;
-    bar.finish_and_clear();
+    let found = speed::measure(&world, frames, &std::env::temp_dir(), &|what| bar.at(what.to_owned()))?;
+    drop(bar);
     if let Some(mut folder) = folder {
         folder.write("README.md", report::speed_page(&found).as_bytes())?;
         folder.write("speed.json", wayhome::storage::json(&found).as_bytes())?;

@@ -1,59 +1,88 @@
 //! `wayhome home`: one closed-loop run, or one a seed.
 
-use std::ops::{ControlFlow, RangeInclusive};
-use std::path::Path;
-use std::sync::Mutex;
+use std::ops::RangeInclusive;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use anyhow::{Result, bail};
 use serde::Serialize;
-use wayhome::Error;
-use wayhome::episode::{Look, Outcome, Progress, Recorder, Setup, Simulation, Summary};
+use wayhome::episode::{Outcome, Progress, Recorder, Setup, Simulation, Start, Summary};
+use wayhome::geometry::Pose;
 use wayhome::record::run::RunFiles;
+use wayhome::record::Format;
 use wayhome::report::{seeds as seeds_report, text};
-use wayhome::sensor::Noise;
-use wayhome::storage::OutputFolder;
 use wayhome::study::row::RunRow;
 use wayhome::study::seeds::{SeedsSummary, run_seeds};
 use wayhome::study::sweep::Row;
 use wayhome::study::sweep::store::StudyFolder;
-use wayhome::vision::ExtractorSettings;
 use wayhome::world::World;
 
-use super::Verdict;
-use super::args::HomeArgs;
-use super::context::{Context, default_folder};
+use super::context::{Context, Verdict, folder_or, open_folder};
+use super::setup::{MethodArgs, SetupArgs};
 use super::threads::awake;
+use super::values::{count, ending, pose, range, row, seeds, start};
 
-/// What `--json` prints for one run: its summary and where the files are.
-#[derive(Serialize)]
-struct RunOutput<'a> {
-    #[serde(flatten)]
-    summary: &'a Summary,
-    out: String,
+/// Arguments of `home`.
+#[derive(Debug, clap::Args)]
+pub struct HomeArgs {
+    /// World file, or the name of a built-in world
+    #[arg(default_value = "worlds/lab.toml")]
+    pub world: String,
+    #[command(flatten)]
+    pub method: MethodArgs,
+    #[command(flatten)]
+    pub setup: SetupArgs,
+    /// Start: `random`, the name of one of the world's starts, or a pose x,y,heading_deg
+    #[arg(long, default_value = "random", allow_hyphen_values = true, value_parser = start)]
+    pub start: Start,
+    /// Seed of the run
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub seed: u64,
+    /// Run all seeds from A to B, both included, in parallel and report on all of them together
+    #[arg(long, value_name = "A..B", conflicts_with = "seed", value_parser = seeds)]
+    pub seeds: Option<RangeInclusive<u64>>,
+    /// Run an episode of a study again, exactly: the study's folder and the episode's number in its rows
+    #[arg(long, value_name = "DIR:ROW", value_parser = row, conflicts_with_all =
+        ["world", "MethodArgs", "SetupArgs", "LookArgs", "start", "seed", "seeds", "initial_estimate"])]
+    pub replay: Option<(PathBuf, u64)>,
+    /// Pose in the home frame at which a filter starts that has to be given one (paper-ekf): x,y,heading_deg
+    #[arg(long, value_name = "x,y,heading_deg", allow_hyphen_values = true, value_parser = pose)]
+    pub initial_estimate: Option<Pose>,
+    /// Record the run as MCAP with Foxglove's schemas: poses, transforms, panoramas, bearings, estimate, commands, diagnostics
+    #[arg(long, value_name = "FILE.mcap", conflicts_with = "seeds", value_parser = ending("mcap"))]
+    pub record: Option<PathBuf>,
+    /// Record the run as an animated GIF: panorama and room
+    #[arg(long, value_name = "FILE.gif", conflicts_with = "seeds", value_parser = ending("gif"))]
+    pub video: Option<PathBuf>,
+    /// Folder for the results [default: results/runs/home-WORLD-SEED]
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
 }
 
-/// What `--json` prints for a batch: its summary, those of the runs, and where the files are.
+/// What `--json` prints for a batch: its summary and those of the runs.
 #[derive(Serialize)]
-struct BatchOutput<'a> {
+struct Batch<'a> {
     #[serde(flatten)]
     batch: &'a SeedsSummary,
     per_seed: &'a [Summary],
-    out: String,
 }
 
 pub fn run(args: &HomeArgs, context: &Context) -> Result<Verdict> {
     if let Some((folder, episode)) = &args.replay {
         return replay(args, context, folder, *episode);
     }
-    let setup = setup(args)?;
+    let setup = Setup {
+        method: args.method.kind(),
+        law: args.method.controller,
+        start: args.start.clone(),
+        initial_estimate: args.initial_estimate,
+        ..args.setup.setup()
+    };
+    setup.check()?;
     let world = World::open(&args.world)?;
     match &args.seeds {
         Some(seeds) => batch(args, context, &world, &setup, seeds),
-        None => {
-            let out = args.out.clone();
-            let out = out.unwrap_or_else(|| default_folder(&["home", &world.spec.name, &args.seed.to_string()]));
-            Ok(verdict(&single(args, context, &world, &setup, args.seed, &out)?))
-        }
+        None => Ok(verdict(&single(args, context, &world, &setup, args.seed, [&world.spec.name, &args.seed.to_string()])?)),
     }
 }
 
@@ -63,9 +92,7 @@ fn replay(args: &HomeArgs, context: &Context, folder: &Path, episode: u64) -> Re
     let row = held.row(episode)?;
     let study = held.study();
     let (world, setup) = study.case(&row.values)?;
-    let out = args.out.clone();
-    let out = out.unwrap_or_else(|| default_folder(&["home", &study.name, &episode.to_string()]));
-    let summary = single(args, context, &world, &setup, row.run.seed, &out)?;
+    let summary = single(args, context, &world, &setup, row.run.seed, [&study.name, &episode.to_string()])?;
     let again = Row::of(episode, row.cell, &row.values, &summary);
     if again != row {
         bail!("episode {episode} of {} did not run as its row says: another machine or build made it", folder.display());
@@ -77,85 +104,44 @@ fn verdict(summary: &Summary) -> Verdict {
     if summary.outcome == Outcome::Home { Verdict::Done } else { Verdict::NotHome }
 }
 
-fn single(args: &HomeArgs, context: &Context, world: &World, setup: &Setup, seed: u64, out: &Path) -> Result<Summary> {
-    setup.check()?;
+/// Runs once; `name` is for the folder where none is given.
+fn single(args: &HomeArgs, context: &Context, world: &World, setup: &Setup, seed: u64, name: [&str; 2]) -> Result<Summary> {
     setup.start_pose(world, wayhome::random::Seed(seed))?; // before a folder is made for a run that cannot start
-    let recordings = args.recordings.recordings();
-    recordings.iter().try_for_each(|(format, path)| format.check(path, out))?;
-    let files = RunFiles::open(out, "home", world)?;
+    let parts = ["home", name[0], name[1]];
+    let out = folder_or(args.out.as_deref(), &parts);
+    let asked = [(Format::Mcap, &args.record), (Format::Gif, &args.video)];
+    let recordings: Vec<_> = asked.into_iter().filter_map(|(format, path)| Some((format, path.as_deref()?))).collect();
+    recordings.iter().try_for_each(|(format, path)| format.check(path, &out))?;
+    let files = RunFiles::open(&out, "home", world)?;
     let mut simulation = Simulation::new(world, setup)?;
-    let mut recorders: Vec<Box<dyn Recorder>> = Vec::new();
-    for (format, path) in recordings {
-        recorders.push(format.open(&path, world)?);
-    }
+    let recorders = recordings.into_iter().map(|(format, path)| format.open(path, world));
+    let mut recorders: Vec<Box<dyn Recorder>> = recorders.collect::<Result<_, _>>()?;
     recorders.push(Box::new(files));
     simulation.record_to(recorders);
     let bar = context.progress(None)?;
-    let mut watch = |progress: &Progress| {
-        bar.set_message(format!("{:.1} s, {:.2} m from home", progress.time_s, progress.distance_m));
-        bar.tick();
-        if context.is_stopped() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-    };
+    let mut watch = |progress: &Progress| bar.at(format!("{:.1} s, {:.2} m from home", progress.time_s, progress.distance_m));
     let mut run = || simulation.run(seed, &mut watch);
     let record = if setup.sensor.is_seeing() { awake(run)?? } else { run()? };
-    bar.finish_and_clear();
+    drop(bar);
     let summary = Summary::new(&record, world, setup, seed);
-    let output = RunOutput { summary: &summary, out: out.display().to_string() };
-    context.print(&output, || text::run(&summary, out))?;
+    context.print_made(&summary, &out, || text::run(&summary, &out))?;
     Ok(summary)
 }
 
 fn batch(args: &HomeArgs, context: &Context, world: &World, setup: &Setup, seeds: &RangeInclusive<u64>) -> Result<Verdict> {
-    let range = format!("{}..{}", seeds.start(), seeds.end());
-    let out = args.out.clone().unwrap_or_else(|| default_folder(&["home", &world.spec.name, &range]));
-    setup.check()?;
-    let folder = OutputFolder::open(&out, "home --seeds", seeds_report::FILES)?;
-    let bar = context.progress(Some(seeds.end() - seeds.start() + 1))?;
-    bar.tick();
-    let home = Mutex::new(0_usize);
-    let runs = run_seeds(world, setup, seeds.clone(), &context.pool(), &|summary| {
-        if let Ok(mut home) = home.lock() {
-            *home += usize::from(summary.outcome == Outcome::Home);
-            bar.set_message(format!("{home} home"));
-        }
-        bar.inc(1);
-    })?;
-    bar.finish_and_clear();
+    let parts = ["home", &world.spec.name, &range(seeds)];
+    let (out, folder) = open_folder(args.out.as_deref(), &parts, "home --seeds", seeds_report::FILES)?;
+    let bar = context.progress(Some(count(seeds)))?;
+    let home = AtomicUsize::new(0);
+    let watch = |summary: &Summary| {
+        let came = usize::from(summary.outcome == Outcome::Home);
+        bar.done(format!("{} home", home.fetch_add(came, Ordering::Relaxed) + came));
+    };
+    let runs = run_seeds(world, setup, seeds.clone(), &context.pool(), &watch)?;
+    drop(bar);
     let rows: Vec<RunRow> = runs.iter().map(RunRow::from).collect();
     let batch = SeedsSummary::new(&rows, seeds, world, setup);
     seeds_report::write(folder, &batch, &rows)?;
-    let output = BatchOutput { batch: &batch, per_seed: &runs, out: out.display().to_string() };
-    context.print(&output, || text::seeds(&batch, &rows, &out))?;
+    context.print_made(&Batch { batch: &batch, per_seed: &runs }, &out, || text::seeds(&batch, &rows, &out))?;
     Ok(Verdict::Done)
-}
-
-/// The setup that the arguments ask for.
-fn setup(args: &HomeArgs) -> Result<Setup, Error> {
-    let (look, home_look) = (args.look.look(), Look { light: args.home_light, camera: args.home_camera });
-    let noisy = args.noise_deg.is_some() || args.noise_dropout.is_some() || args.noise_false.is_some();
-    let usual = Noise::default();
-    let mut extractor = ExtractorSettings::default();
-    extractor.landmarks = args.landmarks.unwrap_or(extractor.landmarks);
-    Ok(Setup {
-        plant: args.plant,
-        sensor: args.bearings,
-        method: args.patience.method(&args.method),
-        law: args.controller,
-        renderer: args.renderer,
-        size_px: args.size,
-        extractor,
-        look,
-        home_look,
-        dataset: args.set.choice(),
-        noise: noisy.then(|| Noise {
-            sd_rad: args.noise_deg.map_or(usual.sd_rad, f64::to_radians),
-            dropout: args.noise_dropout.unwrap_or(usual.dropout),
-            false_match: args.noise_false.unwrap_or(usual.false_match),
-        }),
-        compass_sd_rad: args.compass_deg.map(f64::to_radians),
-        start: args.start.clone(),
-        initial_estimate: args.initial_estimate,
-        time_limit_s: args.time_limit_s,
-        ..Setup::default()
-    })
 }

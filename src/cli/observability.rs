@@ -4,14 +4,12 @@ use std::path::PathBuf;
 
 use anyhow::Result;
 use serde::Serialize;
-use wayhome::report::paper::{map_summary, map_svg};
-use wayhome::storage::OutputFolder;
+use wayhome::report::paper::{map_csv, map_summary, map_svg};
 use wayhome::study::observability::{Facing, ObservabilityMap, map};
 use wayhome::world::World;
 
-use super::Verdict;
-use super::args::{number, positive};
-use super::context::{Context, default_folder};
+use super::context::{Context, Verdict, open_folder};
+use super::values::{number, positive};
 
 /// Names of all files.
 const FILES: &[&str] = &["observability.svg", "observability.csv"];
@@ -35,11 +33,10 @@ pub struct ObservabilityArgs {
 
 /// What `--json` prints.
 #[derive(Serialize)]
-struct Output<'a> {
+struct Mapped<'a> {
     #[serde(flatten)]
     map: &'a ObservabilityMap,
     degenerate_share: f64,
-    out: String,
 }
 
 pub fn run(args: &ObservabilityArgs, context: &Context) -> Result<Verdict> {
@@ -49,30 +46,12 @@ pub fn run(args: &ObservabilityArgs, context: &Context) -> Result<Verdict> {
         Some(degrees) => (Facing::Heading(degrees.to_radians()), format!("facing {degrees} degrees")),
     };
     let map = map(&world, facing, args.spacing_m)?;
-    let out = args.out.clone().unwrap_or_else(|| default_folder(&["observability", &world.spec.name]));
-    let mut folder = OutputFolder::open(&out, "observability", FILES)?;
+    let parts = ["observability", &world.spec.name];
+    let (out, mut folder) = open_folder(args.out.as_deref(), &parts, "observability", FILES)?;
     folder.write("observability.svg", map_svg(&world, &map, &words).as_bytes())?;
-    folder.write("observability.csv", csv(&map).as_bytes())?;
+    folder.write("observability.csv", map_csv(&map).as_bytes())?;
     folder.finish()?;
-    let output = Output { map: &map, degenerate_share: map.degenerate_share(), out: out.display().to_string() };
-    context.print(&output, || format!("{}  files  {}\n", map_summary(&map, &words), out.display()))?;
+    let mapped = Mapped { map: &map, degenerate_share: map.degenerate_share() };
+    context.print_made(&mapped, &out, || format!("{}  files  {}\n", map_summary(&map, &words), out.display()))?;
     Ok(Verdict::Done)
-}
-
-/// One row a place; `inf` where the block is singular.
-fn csv(map: &ObservabilityMap) -> String {
-    let mut text = "x_m,y_m,landmarks,rank,condition,best_condition,median_condition\n".to_owned();
-    for p in &map.places {
-        text += &format!(
-            "{},{},{},{},{},{},{}\n",
-            p.x_m,
-            p.y_m,
-            p.landmarks,
-            p.landmarks + p.rank,
-            p.condition,
-            p.best_condition,
-            p.median_condition
-        );
-    }
-    text
 }

@@ -1,14 +1,22 @@
 //! `wayhome physics-report`: the physics against its closed forms, as a page.
 
+use std::path::PathBuf;
+
 use anyhow::Result;
 use serde::Serialize;
 use wayhome::storage::OutputFolder;
 use wayhome::verify::physics;
 use wayhome::verify::physics::page as physics_report;
 
-use super::Verdict;
-use super::args::PhysicsReportArgs;
-use super::context::Context;
+use super::context::{Context, Verdict};
+
+/// Arguments of `physics-report`.
+#[derive(Debug, clap::Args)]
+pub struct PhysicsReportArgs {
+    /// Folder for the page; trajectories of another engine that lie there are shown too
+    #[arg(long, value_name = "DIR", default_value = "results/physics")]
+    pub out: PathBuf,
+}
 
 /// What `--json` prints.
 #[derive(Serialize)]

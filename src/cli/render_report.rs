@@ -1,5 +1,7 @@
 //! `wayhome render-report`: how fast the renderer is and what it shows, as a page.
 
+use std::path::PathBuf;
+
 use anyhow::Result;
 use serde::Serialize;
 use wayhome::dataset::film;
@@ -13,10 +15,20 @@ use wayhome::verify::render::page as render_report;
 use wayhome::verify::render::{Effort, Findings};
 use wayhome::world::{CameraPreset, LightPreset, World};
 
-use super::Verdict;
-use super::args::RenderReportArgs;
-use super::context::Context;
-use super::render::measured;
+use super::context::{Context, Verdict};
+use super::render::bench::measured;
+use super::values::positive;
+
+/// Arguments of `render-report`.
+#[derive(Debug, clap::Args)]
+pub struct RenderReportArgs {
+    /// Seconds that go into each figure
+    #[arg(long, value_name = "S", default_value = "2", allow_negative_numbers = true, value_parser = positive)]
+    pub seconds: f64,
+    /// Folder for the page
+    #[arg(long, value_name = "DIR", default_value = "results/rendering")]
+    pub out: PathBuf,
+}
 
 /// Size of the pictures on the sheets.
 const SIZE: (u32, u32) = (560, 70);

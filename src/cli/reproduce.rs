@@ -4,6 +4,7 @@ use std::cell::OnceCell;
 use std::path::PathBuf;
 
 use anyhow::Result;
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use serde::Serialize;
 use strum::VariantArray;
 use wayhome::Error;
@@ -17,15 +18,14 @@ use wayhome::study::paper::ideal::{Ideal, Run, Twists};
 use wayhome::study::paper::images::{ImageCase, ImageSet, image_settings};
 use wayhome::world::World;
 
-use super::Verdict;
-use super::args::{TARGETS, choice};
-use super::context::Context;
+use super::context::{Context, Verdict};
+use super::values::{described, named};
 
 /// Arguments of `reproduce`.
 #[derive(Debug, clap::Args)]
 pub struct ReproduceArgs {
     /// What to reproduce [default: all]
-    #[arg(value_name = "TARGET", value_parser = choice(TARGETS))]
+    #[arg(value_name = "TARGET", value_parser = target())]
     pub targets: Vec<Option<Target>>,
     /// Panoramas on disk instead of rendered ones, for table2 and fig5 (`I_J.png` or `.pgm`, 9 x 19 of them) or for fig7 (Vardy's layout,
     /// `I_J.pgm`, 10 x 17)
@@ -36,11 +36,16 @@ pub struct ReproduceArgs {
     pub out: PathBuf,
 }
 
+/// A target, or `None` for all of them.
+fn target() -> impl TypedValueParser<Value = Option<Target>> {
+    let all = PossibleValue::new("all").help("All of these");
+    PossibleValuesParser::new(Target::VARIANTS.iter().map(described).chain([all])).map(|name| named(Target::VARIANTS, &name))
+}
+
 /// What `--json` prints.
 #[derive(Serialize)]
-struct Output<'a> {
+struct Page<'a> {
     sections: Vec<Text<'a>>,
-    out: String,
 }
 
 /// A section of the page.
@@ -64,22 +69,19 @@ pub fn run(args: &ReproduceArgs, context: &Context) -> Result<Verdict> {
     let mut sections = Vec::new();
     for target in wanted {
         bar.set_message(target.name());
-        bar.tick();
-        if context.is_stopped() {
-            return Err(Error::Interrupted.into());
-        }
+        bar.go_on()?;
         sections.push(workshop.section(target)?);
         bar.inc(1);
     }
-    bar.finish_and_clear();
+    drop(bar);
     page::write(folder, &sections)?;
     let texts = sections.iter().map(|s| Text {
         target: s.target,
         markdown: &s.markdown,
         figures: s.figures.iter().map(|f| f.0).collect(),
     });
-    let output = Output { sections: texts.collect(), out: args.out.display().to_string() };
-    context.print(&output, || {
+    let page = Page { sections: texts.collect() };
+    context.print_made(&page, &args.out, || {
         let body: Vec<&str> = sections.iter().map(|s| s.markdown.as_str()).collect();
         format!("{}\nfiles in {}\n", body.join("\n"), args.out.display())
     })?;
@@ -191,14 +193,4 @@ fn made<T>(cell: &OnceCell<T>, make: impl FnOnce() -> Result<T, Error>) -> Resul
     }
     let value = make()?;
     Ok(cell.get_or_init(|| value))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn targets_have_their_names() {
-        assert!(Target::VARIANTS.iter().all(|target| crate::cli::args::name_of(TARGETS, &Some(*target)) == target.name()));
-    }
 }

@@ -1,80 +1,60 @@
 //! `wayhome robustness`: success against conditions that worsen one at a time.
 
+use std::ops::RangeInclusive;
+use std::path::PathBuf;
+
 use anyhow::Result;
-use serde::Serialize;
-use wayhome::episode::Setup;
+use strum::VariantArray;
+use wayhome::Error;
+use wayhome::episode::{PlantKind, Setup};
 use wayhome::report::robustness as report;
-use wayhome::storage::OutputFolder;
-use wayhome::study::robustness::{Axis, Robustness, batches, run as run_study};
+use wayhome::study::robustness::{Axis, batches, run as run_study};
 use wayhome::world::World;
 
-use super::Verdict;
-use super::args::{RobustnessArgs, bearings_name, law_name, quoted, renderer_name};
-use super::context::{Context, default_folder};
+use super::context::{Context, Verdict, open_folder};
+use super::setup::{MethodArgs, SetupArgs};
+use super::values::{choice, count, range, seeds};
 
-/// What `--json` prints: the study and where the files are.
-#[derive(Serialize)]
-struct Output<'a> {
-    #[serde(flatten)]
-    study: &'a Robustness,
-    out: String,
+/// Arguments of `robustness`.
+#[derive(Debug, clap::Args)]
+#[command(mut_arg("bearings", |arg| arg.help("Where bearings come from, before they are made worse")))]
+pub struct RobustnessArgs {
+    /// World file, or the name of a built-in world
+    #[arg(default_value = "lab")]
+    pub world: String,
+    /// Run all seeds from A to B, both included, at every level
+    #[arg(long, value_name = "A..B", default_value = "1..40", value_parser = seeds)]
+    pub seeds: RangeInclusive<u64>,
+    /// What gets worse; several are separated by commas [default: all]
+    #[arg(long, value_name = "AXIS", value_delimiter = ',', value_parser = choice::<Axis>())]
+    pub axis: Vec<Axis>,
+    #[command(flatten)]
+    pub method: MethodArgs,
+    #[command(flatten)]
+    pub setup: SetupArgs,
+    /// Folder for the results [default: results/runs/robustness-WORLD-SEEDS]
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
 }
 
 pub fn run(args: &RobustnessArgs, context: &Context) -> Result<Verdict> {
-    let world = World::open(&args.world)?;
-    let setup = Setup {
-        sensor: args.bearings,
-        method: args.patience.method(&args.method),
-        law: args.controller,
-        renderer: args.renderer,
-        size_px: args.size,
-        time_limit_s: args.time_limit_s,
-        ..Setup::default()
-    };
+    let setup = Setup { method: args.method.kind(), law: args.method.controller, ..args.setup.setup() };
     setup.check()?;
-    let axes = axes(args);
-    let range = format!("{}..{}", args.seeds.start(), args.seeds.end());
-    let out = args.out.clone().unwrap_or_else(|| default_folder(&["robustness", &world.spec.name, &range]));
-    let folder = OutputFolder::open(&out, "robustness", report::FILES)?;
-    let runs = batches(&axes) as u64 * (args.seeds.end() - args.seeds.start() + 1);
-    let bar = context.progress(Some(runs))?;
-    bar.tick();
-    let study = run_study(&world, &setup, &axes, &args.seeds, &context.pool(), &|axis, level| {
-        bar.set_message(format!("{} {level}", axis.name()));
-        bar.inc(1);
-    })?;
-    bar.finish_and_clear();
-    report::write(folder, &study, &command(args))?;
-    let output = Output { study: &study, out: out.display().to_string() };
-    context.print(&output, || format!("{}\nfiles  {}\n", report::table(&study), out.display()))?;
+    let world = World::open(&args.world)?;
+    // Each once and in the order of the report; all where none is named.
+    let is_chosen = |axis: &Axis| args.axis.is_empty() || args.axis.contains(axis);
+    let axes: Vec<Axis> = Axis::VARIANTS.iter().copied().filter(is_chosen).collect();
+    if setup.plant == PlantKind::Unicycle && axes.contains(&Axis::Friction) {
+        let (found, allowed) = ("--plant unicycle, which does not slip".into(), "--plant rapier, or other axes".into());
+        return Err(Error::Invalid { what: "plant for --axis friction".into(), found, allowed }.into());
+    }
+    let parts = ["robustness", &world.spec.name, &range(&args.seeds)];
+    let (out, folder) = open_folder(args.out.as_deref(), &parts, "robustness", report::FILES)?;
+    let bar = context.progress(Some(batches(&axes) as u64 * count(&args.seeds)))?;
+    let watch = |axis: Axis, level: f64| bar.done(format!("{} {level}", axis.name()));
+    let study = run_study(&world, &setup, &axes, &args.seeds, &context.pool(), &watch)?;
+    drop(bar);
+    report::write(folder, &study, &context.command_line(&[]))?;
+    context.print_made(&study, &out, || format!("{}\nfiles  {}\n", report::table(&study), out.display()))?;
     Ok(Verdict::Done)
-}
-
-/// The axes asked for, each once and in the order of the report; all where none is named.
-fn axes(args: &RobustnessArgs) -> Vec<Axis> {
-    Axis::ALL.into_iter().filter(|axis| args.axis.is_empty() || args.axis.contains(axis)).collect()
-}
-
-/// The command that gives the same files, without what does not matter to them.
-fn command(args: &RobustnessArgs) -> String {
-    let mut words = vec!["wayhome robustness".to_owned(), quoted(&args.world)];
-    let mut flag = |name: &str, value: String| words.push(format!("--{name} {}", quoted(&value)));
-    flag("seeds", format!("{}..{}", args.seeds.start(), args.seeds.end()));
-    if !args.axis.is_empty() {
-        flag("axis", axes(args).iter().map(|a| a.name()).collect::<Vec<_>>().join(","));
-    }
-    flag("bearings", bearings_name(args.bearings).to_owned());
-    flag("method", quoted(&args.method.to_string()));
-    flag("controller", law_name(args.controller).to_owned());
-    flag("renderer", renderer_name(args.renderer).to_owned());
-    if let Some((width, height)) = args.size {
-        flag("size", format!("{width}x{height}"));
-    }
-    if let Some(limit) = args.time_limit_s {
-        flag("time-limit-s", limit.to_string());
-    }
-    if let Some(out) = &args.out {
-        flag("out", out.display().to_string());
-    }
-    words.join(" ")
 }

@@ -1,9 +1,9 @@
 //! `wayhome sweep`: stress studies, their shards, and their report.
 
 use std::fmt::Write;
-use std::ops::{ControlFlow, RangeInclusive};
+use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
-use std::sync::Mutex;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 
 use anyhow::Result;
@@ -14,28 +14,22 @@ use wayhome::study::statistics::wilson_95;
 use wayhome::study::sweep::store::{Rate, StudyFolder};
 use wayhome::study::sweep::{Row, Study, catalogue, run as run_chunks};
 
-use super::Verdict;
-use super::args::seeds;
-use super::context::{Context, default_folder, print};
+use super::context::{Context, Verdict, folder_or, print};
+use super::values::{seeds, shard};
 
 /// Shown under `sweep --help`.
-pub const HELP: &str =
+const HELP: &str =
     "A study file names a world, settings, axes and seeds; worlds/studies/ has some, which go by their names too.
 The same command goes on where a killed one was. The rows in rows.parquet depend on the study alone.
 
 Shards: --shard 2/8 runs every eighth chunk from the second on. Without --shard, an array job of Slurm is a shard by
 SLURM_ARRAY_TASK_ID and SLURM_ARRAY_TASK_COUNT, and an indexed job of Kubernetes one by JOB_COMPLETION_INDEX and
-WAYHOME_SHARDS. Shards may share one folder, or have one each for `sweep merge`.
-
-Exit codes:
-  0    done
-  1    failed: a file or a folder, or a row that is missing
-  2    usage: an argument, or a folder of another study
-  130  interrupted by Ctrl-C; finished chunks are kept";
+WAYHOME_SHARDS. Shards may share one folder, or have one each for `sweep merge`, which fails where a row is missing or a folder is
+of another study.";
 
 /// Arguments of `sweep`.
 #[derive(Debug, clap::Args)]
-#[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
+#[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true, after_help = HELP)]
 pub struct SweepArgs {
     #[command(subcommand)]
     pub command: Option<SweepCommand>,
@@ -82,24 +76,6 @@ pub enum SweepCommand {
     },
 }
 
-/// `DIR:ROW`.
-pub fn row(text: &str) -> Result<(PathBuf, u64), String> {
-    let parts = text.rsplit_once(':').and_then(|(folder, row)| Some((folder, row.parse().ok()?)));
-    let (folder, row) =
-        parts.filter(|(folder, _)| !folder.is_empty()).ok_or("a row is DIR:ROW, such as results/runs/sweep:17")?;
-    Ok((PathBuf::from(folder), row))
-}
-
-/// `i/n`.
-fn shard(text: &str) -> Result<[u64; 2], String> {
-    let parts = text.split_once('/').and_then(|(i, n)| Some([i.parse().ok()?, n.parse().ok()?]));
-    let [i, n]: [u64; 2] = parts.ok_or("a shard is i/n, such as 2/8")?;
-    if i == 0 || i > n {
-        return Err(format!("allowed are shards 1/{n} to {n}/{n}", n = n.max(1)));
-    }
-    Ok([i, n])
-}
-
 /// The shard that a batch system gave this process, if one did.
 fn shard_from(variable: impl Fn(&str) -> Option<String>) -> Result<Option<[u64; 2]>, Error> {
     let number = |name: &str| -> Result<Option<u64>, Error> {
@@ -129,7 +105,7 @@ fn shard_from(variable: impl Fn(&str) -> Option<String>) -> Result<Option<[u64; 
 
 /// What `--json` prints.
 #[derive(Serialize)]
-struct Output {
+struct Swept {
     study: String,
     study_sha256: String,
     shard: [u64; 2],
@@ -139,7 +115,6 @@ struct Output {
     complete: bool,
     /// Episodes that this call ran, and how fast.
     rate: Rate,
-    out: String,
 }
 
 pub fn run(args: &SweepArgs, context: &Context) -> Result<Verdict> {
@@ -164,28 +139,25 @@ fn sweep(args: &SweepArgs, argument: &str, context: &Context) -> Result<Verdict>
         None => shard_from(|name| std::env::var(name).ok())?.unwrap_or([1, 1]),
     };
     let study = Study::open(argument, args.seeds.clone())?;
-    let out = args.out.clone().unwrap_or_else(|| default_folder(&["sweep", &study.name]));
+    let out = folder_or(args.out.as_deref(), &["sweep", &study.name]);
     let folder = StudyFolder::create(&out, study, Path::new(argument), args.keep_failures)?;
     let study = folder.study();
     let done = folder.done()?;
     let chunks: Vec<u64> = (0..study.chunks()).filter(|k| k % of == shard - 1 && !done.contains(k)).collect();
     let episodes: u64 = chunks.iter().map(|&k| study.chunk(k).count).sum();
-    let bar = context.progress(Some(episodes))?;
-    let (began, tally) = (Instant::now(), Mutex::new((0_u64, 0_u64)));
+    let bar = context.work(episodes)?;
+    let (began, home) = (Instant::now(), AtomicU64::new(0));
     let watch = |row: &Row| {
-        if let Ok(mut tally) = tally.lock() {
-            *tally = (tally.0 + 1, tally.1 + u64::from(row.run.is_home()));
-            bar.set_message(progress(*tally, episodes, began.elapsed().as_secs_f64()));
-        }
+        let home = home.fetch_add(u64::from(row.run.is_home()), Ordering::Relaxed) + u64::from(row.run.is_home());
         bar.inc(1);
+        bar.set_message(format!("{:.1} % home", 100.0 * home as f64 / bar.position() as f64));
     };
     let pool = context.pool();
-    let threads = pool.threads;
     let result = run_chunks(study, &chunks, &pool, &folder, &watch);
-    bar.finish_and_clear();
-    let (run, _) = tally.into_inner().unwrap_or_default();
+    let run = bar.position();
+    drop(bar);
     let wall_s = began.elapsed().as_secs_f64();
-    let rate = Rate { threads, episodes: run, wall_s, episodes_per_minute: 60.0 * run as f64 / wall_s.max(1e-9) };
+    let rate = Rate { threads: pool.threads, episodes: run, wall_s, episodes_per_minute: 60.0 * run as f64 / wall_s.max(1e-9) };
     if run > 0 {
         folder.note_rate([shard, of], rate.clone())?;
     }
@@ -197,9 +169,8 @@ fn sweep(args: &SweepArgs, argument: &str, context: &Context) -> Result<Verdict>
 
 fn report_end(context: &Context, folder: &StudyFolder, shard: [u64; 2], complete: bool, rate: Rate) -> Result<()> {
     let study = folder.study();
-    let out = folder.path().display().to_string();
     let rows = folder.parts()?;
-    let output = Output {
+    let swept = Swept {
         study: study.name.clone(),
         study_sha256: study.sha256(),
         shard,
@@ -207,20 +178,19 @@ fn report_end(context: &Context, folder: &StudyFolder, shard: [u64; 2], complete
         episodes_done: rows.len() as u64,
         complete,
         rate,
-        out,
     };
-    context.print(&output, || {
+    context.print_made(&swept, folder.path(), || {
         let home = rows.iter().filter(|row| row.run.is_home()).count();
         let [low, high] = wilson_95(home, rows.len());
-        let rate = &output.rate;
+        let rate = &swept.rate;
         format!(
             "study   {}, {} cells of {} seeds\nrows    {} of {}{}\nhome    {home} of {} (95 % Wilson {:.1} to {:.1} %)\nrate    {} episodes in {:.1} s on {} threads, {:.1} a minute\nfiles   {}\n",
-            output.study,
+            swept.study,
             study.cells(),
             study.episodes_per_cell(),
             rows.len(),
-            output.episodes,
-            if output.complete { ", all of them" } else { "" },
+            swept.episodes,
+            if swept.complete { ", all of them" } else { "" },
             rows.len(),
             100.0 * low,
             100.0 * high,
@@ -228,18 +198,9 @@ fn report_end(context: &Context, folder: &StudyFolder, shard: [u64; 2], complete
             rate.wall_s,
             rate.threads,
             rate.episodes_per_minute,
-            output.out,
+            folder.path().display(),
         )
     })
-}
-
-/// What stands beside the bar: rate, time left, success so far.
-fn progress((run, home): (u64, u64), of: u64, wall_s: f64) -> String {
-    let a_second = run as f64 / wall_s.max(1e-3);
-    let left_s = (of.saturating_sub(run) as f64 / a_second.max(1e-9)) as u64;
-    let left = if left_s < 90 { format!("{left_s} s") } else { format!("{} min", left_s.div_ceil(60)) };
-    let share = 100.0 * home as f64 / run.max(1) as f64;
-    format!("{:.0} a minute, {left} left, {share:.1} % home", 60.0 * a_second)
 }
 
 fn merge(shards: &[PathBuf], out: &Path, context: &Context) -> Result<Verdict> {
@@ -259,12 +220,8 @@ fn report(study: &Path, out: Option<&Path>, context: &Context) -> Result<Verdict
     let folder = StudyFolder::open(study)?;
     let out = out.map_or_else(|| study.join("report"), Path::to_owned);
     let bar = context.progress(None)?;
-    page::write(&folder, &out, &mut || {
-        bar.set_message("running failures again");
-        bar.tick();
-        if context.is_stopped() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-    })?;
-    bar.finish_and_clear();
+    page::write(&folder, &out, &mut || bar.at("running failures again"))?;
+    drop(bar);
     let page = out.join("index.html").display().to_string();
     context.print(&serde_json::json!({ "page": page }), || format!("page    {page}\n"))?;
     Ok(Verdict::Done)
@@ -273,17 +230,6 @@ fn report(study: &Path, out: Option<&Path>, context: &Context) -> Result<Verdict
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn shards_are_read_and_checked() {
-        assert_eq!(shard("2/8"), Ok([2, 8]));
-        for bad in ["0/8", "9/8", "8", "1/0", "a/b", "-1/2", "1/2/3"] {
-            assert!(shard(bad).is_err(), "{bad}");
-        }
-        assert!(shard("9/8").unwrap_err().contains("1/8 to 8/8"));
-        assert_eq!(row("a:b/c:17"), Ok(("a:b/c".into(), 17)));
-        assert!(row("17").is_err() && row(":17").is_err() && row("a:b").is_err());
-    }
 
     #[test]
     fn batch_systems_say_which_shard_it_is() {
@@ -297,11 +243,5 @@ mod tests {
         assert!(given(&[("JOB_COMPLETION_INDEX", "0")]).unwrap_err().to_string().contains("WAYHOME_SHARDS"));
         assert!(given(&[("JOB_COMPLETION_INDEX", "4"), ("WAYHOME_SHARDS", "4")]).unwrap_err().to_string().contains("1 to 4"));
         assert!(given(&[("JOB_COMPLETION_INDEX", "x"), ("WAYHOME_SHARDS", "4")]).is_err());
-    }
-
-    #[test]
-    fn the_bar_tells_rate_time_and_success() {
-        assert_eq!(progress((30, 24), 90, 30.0), "60 a minute, 60 s left, 80.0 % home");
-        assert_eq!(progress((30, 30), 3030, 30.0), "60 a minute, 50 min left, 100.0 % home");
     }
 }

@@ -1,9 +1,10 @@
 //! `wayhome vision-report`: the extractor against ground truth, as a page.
 
 use std::ops::ControlFlow;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use anyhow::Result;
+use clap::builder::RangedU64ValueParser;
 use serde::Serialize;
 use wayhome::Error;
 use wayhome::draw::image::{colours_png, instance_png, range_png};
@@ -17,9 +18,31 @@ use wayhome::verify::vision::{Pair, VisionSettings, VisionStudy, cells, run as r
 use wayhome::vision::ExtractorSettings;
 use wayhome::world::World;
 
-use super::Verdict;
-use super::args::{VisionReportArgs, quoted};
-use super::context::Context;
+use super::context::{Context, Verdict};
+use super::values::choice;
+
+/// Arguments of `vision-report`.
+#[derive(Debug, clap::Args)]
+pub struct VisionReportArgs {
+    /// World files, or names of built-in worlds
+    #[arg(default_values_t = ["lab".to_owned(), "slippery".to_owned(), "crowd".to_owned()], value_name = "WORLD")]
+    pub worlds: Vec<String>,
+    /// What is changed; several are separated by commas [default: all]
+    #[arg(long, value_name = "AXIS", value_delimiter = ',', value_parser = choice::<Axis>())]
+    pub axis: Vec<Axis>,
+    /// Most features kept of a panorama, 16 to 10000 [default: the extractor's]
+    #[arg(long, value_name = "N", value_parser = RangedU64ValueParser::<usize>::new().range(16..=10_000))]
+    pub keypoints: Option<usize>,
+    /// Seed of walkers, noise and what hides
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub seed: u64,
+    /// Folder, new or empty, for the panoramas of the distance axis, which tests/outside/opencv_features.py reads
+    #[arg(long, value_name = "DIR")]
+    pub pairs: Option<PathBuf>,
+    /// Folder for the page; what other detectors made of the same pairs is shown if it lies there
+    #[arg(long, value_name = "DIR", default_value = "results/vision")]
+    pub out: PathBuf,
+}
 
 /// What `--json` prints.
 #[derive(Serialize)]
@@ -77,7 +100,7 @@ pub fn run(args: &VisionReportArgs, context: &Context) -> Result<Verdict> {
     if let Some(pairs) = &args.pairs {
         write_atomically(&pairs.join("pairs.json"), wayhome::storage::json(&records).as_bytes())?;
     }
-    report::write(folder, &study, &command(args), outside.as_deref())?;
+    report::write(folder, &study, &context.command_line(&["pairs"]), outside.as_deref())?;
     let output = Output { study: &study, out: args.out.display().to_string() };
     context.print(&output, || format!("{}files in {}\n", report::table(&study), args.out.display()))?;
     Ok(Verdict::Done)
@@ -117,21 +140,4 @@ fn write_pair(folder: &Path, pair: &Pair<'_>) -> Result<PairRecord, Error> {
         pose: pair.shot.pose.into(),
         projection: panorama.projection,
     })
-}
-
-/// The command that gives the same files, without what does not matter to them.
-fn command(args: &VisionReportArgs) -> String {
-    let mut words = vec!["wayhome vision-report".to_owned()];
-    words.extend(args.worlds.iter().map(|w| quoted(w)));
-    if !args.axis.is_empty() {
-        words.push(format!("--axis {}", args.axis.iter().map(|a| a.name()).collect::<Vec<_>>().join(",")));
-    }
-    if let Some(keypoints) = args.keypoints {
-        words.push(format!("--keypoints {keypoints}"));
-    }
-    if args.seed != 0 {
-        words.push(format!("--seed {}", args.seed));
-    }
-    words.push(format!("--out {}", quoted(&args.out.display().to_string())));
-    words.join(" ")
 }

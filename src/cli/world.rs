@@ -1,14 +1,41 @@
 //! `wayhome world`: check, draw and describe world files.
 
+use std::path::PathBuf;
+
 use anyhow::Result;
 use serde::Serialize;
 use wayhome::draw::map;
 use wayhome::storage::write_atomically;
 use wayhome::world::World;
 
-use super::Verdict;
-use super::args::{WorldArgs, WorldCommand};
-use super::context::{Context, print};
+use super::context::{Context, Verdict, print};
+
+/// Arguments of `world`.
+#[derive(Debug, clap::Args)]
+pub struct WorldArgs {
+    #[command(subcommand)]
+    pub command: WorldCommand,
+}
+
+/// The subcommands of `world`.
+#[derive(Debug, clap::Subcommand)]
+pub enum WorldCommand {
+    /// Check a world file and list all its faults
+    Check {
+        /// World file, or the name of a built-in world
+        world: String,
+    },
+    /// Draw a world from above as SVG
+    Plot {
+        /// World file, or the name of a built-in world
+        world: String,
+        /// File for the drawing [default: stdout]
+        #[arg(long, value_name = "FILE")]
+        out: Option<PathBuf>,
+    },
+    /// Print the JSON Schema of world files
+    Schema,
+}
 
 /// What `world check --json` prints for a world without faults.
 #[derive(Serialize)]

@@ -247,6 +247,14 @@ pub fn free_bytes(folder: &Path) -> Option<u64> {
     }
 }
 
+/// Bytes of memory that are free; `None` where the system does not tell.
+#[must_use]
+pub fn free_memory() -> Option<u64> {
+    let known = fs::read_to_string("/proc/meminfo").ok()?;
+    let kilobytes = known.lines().find_map(|l| l.strip_prefix("MemAvailable:")?.trim().strip_suffix("kB"))?;
+    Some(1024 * kilobytes.trim().parse::<u64>().ok()?)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -5,14 +5,17 @@ use std::f64::consts::{PI, TAU};
 use rand_pcg::rand_core::Rng;
 
 use super::convex::{Convex, gap_to_walls_m};
-use super::polygon::{anticlockwise, bounds, contains};
-use super::{Body, World};
+use super::polygon::{anticlockwise, bounds, contains, distance_to_boundary};
+use super::{Body, Footprint, Partition, World};
 use crate::error::{Error, Result};
 use crate::geometry::{Pose, Vector2};
 use crate::random::Stream;
 
 /// How many random starts are tried before the world is called too crowded.
 const START_TRIES: u32 = 10_000;
+
+/// A camera nearer to a wall than this, m, may be in the wall's plane, and such a camera looks past it.
+const IN_WALL_M: f64 = 1e-9;
 
 impl World {
     /// Whether the robot's body at `pose` keeps `margin_m` from the walls and from all bodies that reach down to its height.
@@ -24,6 +27,31 @@ impl World {
     pub fn is_free(&self, pose: &Pose, margin_m: f64, body_poses: &[Pose]) -> std::result::Result<(), String> {
         let disc = Convex::disc(pose.position(), self.spec.robot.radius_m + margin_m);
         self.first_in_the_way(&disc, self.bodies.iter().zip(body_poses))
+    }
+
+    /// Whether the camera of a robot at `pose` is in the room and neither in a wall nor in a body, each where it is at time 0. The
+    /// robot's own size does not matter.
+    ///
+    /// # Errors
+    /// Where the camera is, in words: `outside the room`, "inside `desk`".
+    pub fn camera_is_free(&self, pose: &Pose) -> std::result::Result<(), String> {
+        let (camera, height_m) = (self.camera_pose(pose).position(), self.spec.camera.height_m);
+        if !contains(&self.outline, camera) {
+            return Err("outside the room".into());
+        }
+        if distance_to_boundary(&self.outline, camera) < IN_WALL_M {
+            return Err("in a wall of the room".into());
+        }
+        let at_its_height = self.bodies.iter().filter(|b| b.bottom_m <= height_m && height_m <= b.top_m);
+        let body = at_its_height.into_iter().find(|b| b.footprint.distance_to(b.pose.inverse_transform(camera)) <= 0.0);
+        let is_in = |stretch: &[f64; 2], wall: &Partition| {
+            Footprint::Polygon(wall.footprint(*stretch).into()).distance_to(camera) < IN_WALL_M
+        };
+        let wall = self.partitions.iter().find(|wall| wall.stretches(height_m, height_m).iter().any(|s| is_in(s, wall)));
+        match body.map(|b| &b.name).or(wall.map(|w| &w.name)) {
+            Some(name) => Err(format!("inside `{name}`")),
+            None => Ok(()),
+        }
     }
 
     /// Whether the robot can drive straight from `from` to `to`, past walls and standing bodies, those that could be pushed away

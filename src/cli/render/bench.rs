@@ -1,12 +1,10 @@
 //! `wayhome render --bench`: how fast this machine renders.
 
 use anyhow::Result;
-use wayhome::Error;
 use wayhome::verify::render::page as render_report;
 use wayhome::verify::render::{Effort, Findings, measure};
 
-use crate::cli::Verdict;
-use crate::cli::context::Context;
+use crate::cli::context::{Context, Verdict};
 
 pub fn run(context: &Context) -> Result<Verdict> {
     let findings = measured(context, Effort { seconds: 1.0 })?;
@@ -20,8 +18,8 @@ pub fn measured(context: &Context, effort: Effort) -> Result<Findings> {
     let findings = measure(effort, &mut |speed| {
         bar.println(render_report::line(speed));
         bar.tick();
-        if context.is_stopped() { Err(Error::Interrupted) } else { Ok(()) }
+        bar.go_on()
     })?;
-    bar.finish_and_clear();
+    drop(bar);
     Ok(findings)
 }

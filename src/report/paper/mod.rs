@@ -18,7 +18,7 @@ use crate::storage::OutputFolder;
 
 pub use audit::{Evidence, audit};
 pub use contest::contest;
-pub use observability::{map_svg, observability, summary as map_summary};
+pub use observability::{map_csv, map_svg, observability, summary as map_summary};
 pub use tables::{fig_five, fig_seven, fig_three, table_one, table_two};
 
 /// What can be reproduced, in the order of the page.

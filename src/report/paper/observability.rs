@@ -56,6 +56,17 @@ pub fn observability(ideal: &Ideal, runs: &[Run], homeward: &ObservabilityMap, e
     Ok(Section { target: Target::Observability, markdown: text, figures })
 }
 
+/// A map as a table: one row a place; `inf` where the block is singular.
+#[must_use]
+pub fn map_csv(map: &ObservabilityMap) -> String {
+    let mut text = "x_m,y_m,landmarks,rank,condition,best_condition,median_condition\n".to_owned();
+    for p in &map.places {
+        let (rank, median) = (p.landmarks + p.rank, p.median_condition);
+        let _ = writeln!(text, "{},{},{},{rank},{},{},{median}", p.x_m, p.y_m, p.landmarks, p.condition, p.best_condition);
+    }
+    text
+}
+
 /// A world's map of the condition, for a robot that faces as `facing` says.
 #[must_use]
 pub fn map_svg(world: &World, map: &ObservabilityMap, facing: &str) -> String {
