@@ -283,12 +283,54 @@ fn a_robustness_study_is_the_same_on_any_number_of_threads() {
     };
     let first = files("1");
     assert_eq!(first[1].lines().count(), 1 + 8 + 6);
-    assert!(first[0].contains("--seeds 1..3 --axis hidden,noise --bearings ideal"), "{}", first[0]);
+    assert!(first[0].contains("--seeds 1..3 --axis noise,hidden"), "{}", first[0]);
     assert_eq!(first, files("2"));
 
     assert_fails(&study("1", &["--axis", "weather"]), 2, &["--axis", "friction"]);
     assert_fails(&study("1", &["--size", "64x32"]), 2, &["--bearings rendered"]);
     assert_fails(&run(folder.path(), &["robustness", LAB, "--seeds", "3..1"]), 2, &["--seeds"]);
+}
+
+/// Runs a command, then the one that its page prints, through a shell, and compares what they wrote.
+#[cfg(unix)]
+#[track_caller]
+fn assert_printed_command_runs_again(arguments: &[&str]) {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::copy(LAB, folder.path().join("my room.toml")).unwrap();
+    let out = "out of '$HOME'";
+    assert_done(&run(folder.path(), &[arguments, &["--out", out]].concat()));
+    let held = |name: &str| files(&folder.path().join(name));
+    std::fs::rename(folder.path().join(out), folder.path().join("first")).unwrap();
+    let page = std::fs::read_to_string(folder.path().join("first/README.md")).unwrap();
+    let command = page.split_once("```sh\n").unwrap().1.split_once("\n```").unwrap().0;
+    let programs = Path::new(env!("CARGO_BIN_EXE_wayhome")).parent().unwrap();
+    let path = format!("{}:{}", programs.display(), std::env::var("PATH").unwrap());
+    let again = Command::new("sh").args(["-c", command]).current_dir(folder.path()).env("PATH", path).output().unwrap();
+    assert!(again.status.success(), "{command}: {}", stderr(&again));
+    assert!(held("first") == held(out), "{command} wrote other files");
+}
+
+#[cfg(unix)]
+#[test]
+fn a_printed_command_runs_again() {
+    // A program that answers nonsense: its runs fail, and are recorded.
+    let program = "exec:echo 'it is' \"$HOME, sweet\" it\\'s";
+    let short = ["--seeds", "1..2", "--time-limit-s", "1", "--bearings", "ideal"];
+    let robustness = ["robustness", "my room.toml", "--axis", "noise", "--method", program];
+    assert_printed_command_runs_again(&[&robustness[..], &short].concat());
+    let compare = [
+        "compare",
+        "my room.toml",
+        "--places",
+        "0",
+        "--contenders",
+        "alv,weber",
+        "--method",
+        program,
+        "--method",
+        "exec:false",
+    ];
+    assert_printed_command_runs_again(&[&compare[..], &short].concat());
 }
 
 #[test]
@@ -533,7 +575,7 @@ fn a_trajectory_becomes_a_film_and_a_sheet() {
     assert_done(&run(folder.path(), &["render", "crowd", "--sheet", "--size", "64x8", "--renderer", "cpu", "--out", "crowd"]));
 
     write("lost.csv", "t,x,y,heading\n0,3,3,0\n1,30,3,0\n");
-    assert_fails(&film("lost.csv", &["--out", "lost"]), 2, &["lost.csv, frame 1", "outside the room"]);
+    assert_fails(&film("lost.csv", &["--out", "lost"]), 1, &["lost.csv: frame 1", "outside the room"]);
     write("bad.csv", "t,x,y,heading\n0,3,,0\n");
     assert_fails(&film("bad.csv", &["--out", "lost"]), 1, &["line 2, y", "finite number"]);
     assert_fails(&film("none.csv", &["--out", "lost"]), 1, &["none.csv"]);
