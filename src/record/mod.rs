@@ -19,7 +19,7 @@ mod scene;
 mod tum;
 mod video;
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use crate::episode::Recorder;
 use crate::error::{Error, Result};
@@ -73,6 +73,3 @@ impl Format {
         }
     }
 }
-
-/// Files to record to.
-pub type Recordings = Vec<(Format, PathBuf)>;
