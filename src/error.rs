@@ -47,6 +47,14 @@ pub enum Error {
         /// What is allowed.
         allowed: String,
     },
+    /// Something was asked for that this build has not.
+    #[error("{what} is not in this build of wayhome; build it with the feature `{feature}`")]
+    FeatureOff {
+        /// What was asked for.
+        what: &'static str,
+        /// The Cargo feature that it comes with.
+        feature: &'static str,
+    },
     /// A picture was asked for from inside a body.
     #[error("camera: found ({x_m}, {y_m}, {z_m}) m, inside `{body}`, allowed is a place outside all bodies")]
     CameraInside {

@@ -61,6 +61,22 @@
 //! the bottom [`panorama`], [`document`]s, [`fault`]s, [`geometry`], [`ode`], [`random`] streams, [`table`]s, [`storage`] and
 //! [`error`]s.
 //!
+//! # Features
+//!
+//! What takes long to build or serves some callers only is a Cargo feature; all are on by default.
+//!
+//! | feature | what it adds |
+//! |---|---|
+//! | `cli` | the program `wayhome`; takes `rapier` along |
+//! | `gpu` | [`render::RendererChoice::Gpu`], by wgpu |
+//! | `parquet` | Parquet files: the rows of [`study::sweep`]s and the truth of [`dataset`]s |
+//! | `rapier` | the plant with mass, slip and collisions ([`episode::PlantKind::Rapier`]), and what [`verify`] holds it against |
+//! | `recording` | recordings of runs as MCAP files |
+//! | `video` | recordings of runs as animated GIFs |
+//!
+//! What is off does not exist, or is refused by [`Error::FeatureOff`], which names the feature. The unicycle, the CPU renderer,
+//! the extractor, all methods and studies are always there.
+//!
 //! # Units and randomness
 //!
 //! SI units; x forward, y left, angles anti-clockwise. One seed gives a run: the same bytes on any number of threads, and with
@@ -81,6 +97,7 @@ pub mod observation;
 pub mod ode;
 pub mod panorama;
 pub mod panorama_set;
+#[cfg_attr(not(feature = "rapier"), allow(dead_code, reason = "what only the plant `rapier` uses of the shared parts"))]
 pub mod physics;
 pub mod random;
 pub mod record;

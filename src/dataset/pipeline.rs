@@ -93,6 +93,7 @@ impl Job<'_> {
         renderer: &mut dyn Renderer,
         watch: &mut (dyn FnMut(Progress) -> ControlFlow<()> + Send),
     ) -> Result<Outcome> {
+        crate::table::Table::check_parquet()?;
         let plan = self.plan;
         let document = plan.document(renderer.info());
         SetFolder::check(self.out, &document)?;

@@ -168,7 +168,7 @@ pub fn drive(world: &World, start: Pose, seed: Seed, commands: &Commands, watch:
     }
     let mut setup = Setup { start: Start::At(start), ..Setup::default() };
     setup.time_limit_s = Some(f64::INFINITY);
-    let parts = Parts::with_sensor(world, PlantKind::Rapier, Box::new(Blind::default()));
+    let parts = Parts::with_sensor(world, PlantKind::Rapier, Box::new(Blind::default()))?;
     let mut simulation = Simulation::from_parts(world, &setup, parts);
     simulation.reset_at(seed.0, start)?;
     let mut last = state(&simulation, 0.0, Twist::default());

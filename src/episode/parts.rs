@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::setup::{PlantKind, SensorKind, Setup};
 use crate::error::Result;
 use crate::geometry::Pose;
-use crate::physics::{Plant, RapierPlant, UnicyclePlant};
+use crate::physics::{Plant, UnicyclePlant};
 use crate::random::Seed;
 use crate::render::{self, Scene};
 use crate::sensor::{
@@ -28,28 +28,33 @@ impl<'a> Parts<'a> {
     /// Those that `setup` names, in `world`.
     ///
     /// # Errors
-    /// When the world cannot be packed, the renderer cannot be had, or the set cannot be opened.
+    /// When the world cannot be packed, the plant or the renderer cannot be had, or the set cannot be opened.
     pub fn new(world: &'a World, setup: &Setup) -> Result<Self> {
         Self::shared(world, setup, &Shared::new(world, setup)?)
     }
 
     /// A plant by name and a sensor of a caller's own.
-    #[must_use]
-    pub fn with_sensor(world: &'a World, kind: PlantKind, sensor: Box<dyn Sensor + 'a>) -> Self {
-        Self { plant: plant(world, kind), sensor }
+    ///
+    /// # Errors
+    /// [`Error::FeatureOff`] where this build has no such plant.
+    pub fn with_sensor(world: &'a World, kind: PlantKind, sensor: Box<dyn Sensor + 'a>) -> Result<Self> {
+        Ok(Self { plant: plant(world, kind)?, sensor })
     }
 
     /// The same, with what is costly taken from `shared`.
     pub(super) fn shared(world: &'a World, setup: &Setup, shared: &Shared) -> Result<Self> {
-        Ok(Self { plant: plant(world, setup.plant), sensor: sensor(world, setup, shared)? })
+        Ok(Self { plant: plant(world, setup.plant)?, sensor: sensor(world, setup, shared)? })
     }
 }
 
 /// The plant by name.
-fn plant(world: &World, kind: PlantKind) -> PlantMaker<'_> {
+fn plant(world: &World, kind: PlantKind) -> Result<PlantMaker<'_>> {
     match kind {
-        PlantKind::Rapier => Box::new(|start, seed| Box::new(RapierPlant::new(world, start, seed))),
-        PlantKind::Unicycle => Box::new(|start, seed| Box::new(UnicyclePlant::new(world, start, seed))),
+        #[cfg(feature = "rapier")]
+        PlantKind::Rapier => Ok(Box::new(|start, seed| Box::new(crate::physics::RapierPlant::new(world, start, seed)))),
+        #[cfg(not(feature = "rapier"))]
+        PlantKind::Rapier => Err(crate::Error::FeatureOff { what: "the plant `rapier`", feature: "rapier" }),
+        PlantKind::Unicycle => Ok(Box::new(|start, seed| Box::new(UnicyclePlant::new(world, start, seed)))),
     }
 }
 

@@ -22,18 +22,25 @@
 //! bend and stretch paths by up to 0.1 %. Asking it only where bodies move one another keeps that out, makes the closed forms
 //! of friction and of hits hold in the full plant to f64 accuracy, and is some five times as fast.
 
+#[cfg(feature = "rapier")]
 mod arena;
 mod chassis;
 mod contact;
+#[cfg(feature = "rapier")]
 mod drive;
+#[cfg(feature = "rapier")]
 mod gyro;
+#[cfg(feature = "rapier")]
 mod hull;
 mod motor;
 mod movers;
+#[cfg(feature = "rapier")]
 mod rapier_plant;
 mod script;
+#[cfg(feature = "rapier")]
 mod slide;
 mod unicycle;
+#[cfg(feature = "rapier")]
 mod vicinity;
 
 use crate::geometry::{Pose, Twist, Vector2};
@@ -42,7 +49,8 @@ use crate::world::{Partition, World};
 
 pub use chassis::{Chassis, PlanarVelocity, STANDARD_GRAVITY_M_S2};
 pub use motor::WheelDrive;
-pub use rapier_plant::{FloorContact, RapierPlant, SUBSTEP_S};
+#[cfg(feature = "rapier")]
+pub use rapier_plant::{RapierPlant, SUBSTEP_S};
 pub use unicycle::UnicyclePlant;
 
 /// What happened during one control interval.
@@ -148,6 +156,20 @@ pub struct WheelState {
     pub wheel_speeds_rad_s: [f64; 2],
     /// Slip, forces and loads, means over the last interval.
     pub floor: FloorContact,
+}
+
+/// What passed between the robot and the floor during a control interval: means over its substeps. For the record, never for a
+/// method.
+///
+/// Vectors are (forward, leftward) in the robot's frame.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct FloorContact {
+    /// Slip of the left and right wheel, m/s: the hub's speed over ground less the wheel's rolling speed.
+    pub slip_m_s: [Vector2<f64>; 2],
+    /// Force of the floor on the left wheel, the right wheel and the caster, N.
+    pub force_n: [Vector2<f64>; 3],
+    /// Load on the left wheel, the right wheel and the caster, N.
+    pub load_n: [f64; 3],
 }
 
 /// The command as a plant takes it: a command that is not finite is a stop.

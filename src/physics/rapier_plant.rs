@@ -9,7 +9,7 @@ use super::motor::WheelDrive;
 use super::movers::{Movers, Walkway};
 use super::script::{Event, Script};
 use super::vicinity::{Near, Scene, Vicinity};
-use super::{Collision, Plant, PlantStep, Struck, Touched, WheelState};
+use super::{Collision, FloorContact, Plant, PlantStep, Struck, Touched, WheelState};
 use crate::geometry::{Pose, Twist, Vector2};
 use crate::random::Seed;
 use crate::world::polygon::contains;
@@ -55,20 +55,6 @@ pub struct RapierPlant {
     /// What happened in the last interval.
     floor_contact: FloorContact,
     collisions: Vec<Collision>,
-}
-
-/// What passed between the robot and the floor during a control interval: means over its substeps. For the record, never for a
-/// method.
-///
-/// Vectors are (forward, leftward) in the robot's frame.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct FloorContact {
-    /// Slip of the left and right wheel, m/s: the hub's speed over ground less the wheel's rolling speed.
-    pub slip_m_s: [Vector2<f64>; 2],
-    /// Force of the floor on the left wheel, the right wheel and the caster, N.
-    pub force_n: [Vector2<f64>; 3],
-    /// Load on the left wheel, the right wheel and the caster, N.
-    pub load_n: [f64; 3],
 }
 
 impl RapierPlant {

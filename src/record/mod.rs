@@ -9,14 +9,20 @@
 
 mod columns;
 pub mod drive;
+#[cfg_attr(not(any(feature = "recording", feature = "video")), allow(dead_code, reason = "recordings alone write such files"))]
 mod file;
+#[cfg(feature = "recording")]
 mod mcap_file;
+#[cfg(feature = "recording")]
 mod messages;
 pub mod path_plot;
+#[cfg(feature = "video")]
 mod raster;
 pub mod run;
+#[cfg(feature = "recording")]
 mod scene;
 mod tum;
+#[cfg(feature = "video")]
 mod video;
 
 use std::path::Path;
@@ -24,8 +30,6 @@ use std::path::Path;
 use crate::episode::Recorder;
 use crate::error::{Error, Result};
 use crate::world::World;
-use mcap_file::McapRecording;
-use video::VideoRecording;
 
 /// Recordings that are files of their own.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -40,10 +44,10 @@ impl Format {
     /// Checks what can be checked before a run whose other results go to `out`.
     ///
     /// # Errors
-    /// When the folder of the file is not there, a file is there that no earlier run has recorded, or it would lie among the other
+    /// When this build has no such recording, the folder of the file is not there, a file is there that no earlier run has recorded, or it would lie among the other
     /// results.
     pub fn check(self, path: &Path, out: &Path) -> Result<()> {
-        file::check(path, self.kind())?;
+        file::check(path, self.kind()?)?;
         let (own, results) = (file::folder_of(path).canonicalize(), out.canonicalize());
         if own.is_ok_and(|own| results.is_ok_and(|results| own == results)) {
             return Err(Error::Invalid {
@@ -58,18 +62,38 @@ impl Format {
     /// Begins a recording of a run in `world`. One of a run that does not come to its end leaves nothing.
     ///
     /// # Errors
-    /// When the file cannot be created.
+    /// When the file cannot be created, or this build has no such recording.
     pub fn open<'a>(self, path: &Path, world: &'a World) -> Result<Box<dyn Recorder + 'a>> {
-        Ok(match self {
-            Self::Mcap => Box::new(McapRecording::create(world, path)?),
-            Self::Gif => Box::new(VideoRecording::create(world, path)?),
-        })
+        match self {
+            #[cfg(feature = "recording")]
+            Self::Mcap => Ok(Box::new(mcap_file::McapRecording::create(world, path)?)),
+            #[cfg(feature = "video")]
+            Self::Gif => Ok(Box::new(video::VideoRecording::create(world, path)?)),
+            #[cfg(not(all(feature = "recording", feature = "video")))]
+            _ => {
+                let _ = (path, world);
+                Err(self.off())
+            }
+        }
     }
 
-    fn kind(self) -> &'static file::Kind {
+    fn kind(self) -> Result<&'static file::Kind> {
         match self {
-            Self::Mcap => &mcap_file::KIND,
-            Self::Gif => &video::KIND,
+            #[cfg(feature = "recording")]
+            Self::Mcap => Ok(&mcap_file::KIND),
+            #[cfg(feature = "video")]
+            Self::Gif => Ok(&video::KIND),
+            #[cfg(not(all(feature = "recording", feature = "video")))]
+            _ => Err(self.off()),
+        }
+    }
+
+    /// Why this build has no such recording.
+    #[cfg(not(all(feature = "recording", feature = "video")))]
+    fn off(self) -> Error {
+        match self {
+            Self::Mcap => Error::FeatureOff { what: "the recording as MCAP", feature: "recording" },
+            Self::Gif => Error::FeatureOff { what: "the recording as GIF", feature: "video" },
         }
     }
 }

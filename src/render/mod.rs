@@ -22,6 +22,7 @@ mod camera;
 mod columns;
 mod cpu;
 mod frame;
+#[cfg(feature = "gpu")]
 mod gpu;
 mod hits;
 mod huge_pages;
@@ -42,6 +43,7 @@ use crate::panorama::{Panorama, Projection};
 
 pub use camera::Camera;
 pub use cpu::CpuRenderer;
+#[cfg(feature = "gpu")]
 pub use gpu::{GpuRenderer, SHADER};
 pub use instructions::InstructionSet;
 pub use scene::Scene;
@@ -153,21 +155,30 @@ pub fn most_in_memory(projection: Projection) -> usize {
 /// The renderer of a person's choice.
 ///
 /// # Errors
-/// [`Error::NoAdapter`] where the GPU is asked for and there is none, [`Error::Gpu`] where it cannot be used.
+/// [`Error::NoAdapter`] where the GPU is asked for and there is none, [`Error::Gpu`] where it cannot be used, and
+/// [`Error::FeatureOff`] where this build has no GPU renderer.
 pub fn create(choice: RendererChoice) -> Result<Box<dyn Renderer>> {
     match choice {
         RendererChoice::Cpu => Ok(Box::new(CpuRenderer::new())),
-        RendererChoice::Gpu => Ok(Box::new(GpuRenderer::new()?)),
-        RendererChoice::Auto => match GpuRenderer::on_hardware() {
-            Ok(renderer) => Ok(Box::new(renderer)),
-            Err(Error::NoAdapter(why)) => {
-                log::debug!("rendering on the CPU: no hardware adapter ({why})");
-                Ok(Box::new(CpuRenderer::new()))
+        RendererChoice::Gpu => on_gpu(false),
+        RendererChoice::Auto => on_gpu(true).or_else(|error| {
+            match error {
+                Error::NoAdapter(why) => log::debug!("rendering on the CPU: no hardware adapter ({why})"),
+                Error::FeatureOff { .. } => {}
+                error => log::warn!("rendering on the CPU: {error}"),
             }
-            Err(error) => {
-                log::warn!("rendering on the CPU: {error}");
-                Ok(Box::new(CpuRenderer::new()))
-            }
-        },
+            Ok(Box::new(CpuRenderer::new()))
+        }),
     }
+}
+
+/// A renderer on a graphics adapter; with `hardware` on no software one.
+#[cfg(feature = "gpu")]
+fn on_gpu(hardware: bool) -> Result<Box<dyn Renderer>> {
+    Ok(Box::new(if hardware { GpuRenderer::on_hardware()? } else { GpuRenderer::new()? }))
+}
+
+#[cfg(not(feature = "gpu"))]
+fn on_gpu(_hardware: bool) -> Result<Box<dyn Renderer>> {
+    Err(Error::FeatureOff { what: "the renderer on graphics adapters", feature: "gpu" })
 }

@@ -116,6 +116,7 @@ const MOST_PIECES: f64 = 4.0;
 #[derive(Debug, Clone)]
 pub struct Scene {
     /// Tells textures of scenes apart, so that a renderer knows which ones it holds on its device.
+    #[cfg_attr(not(feature = "gpu"), allow(dead_code, reason = "graphics adapters alone hold textures"))]
     pub(super) id: u64,
     pub(super) outline: Vec<Vector2<f64>>,
     pub(super) bodies: Vec<Prism>,

@@ -322,7 +322,7 @@ impl Path {
         let setup = Setup { plant: PlantKind::Unicycle, start: settings.start.clone(), ..Setup::default() };
         let seed = Seed(settings.path_seed);
         let sensor = NoisySensor::new(IdealSensor::new(world), world.landmark_count, settings.noise(), seed);
-        let parts = Parts::with_sensor(world, setup.plant, Box::new(sensor));
+        let parts = Parts::with_sensor(world, setup.plant, Box::new(sensor))?;
         let mut simulation = Simulation::from_parts(world, &setup, parts);
         let bodies = Bodies::default();
         simulation.record_to(bodies.clone());

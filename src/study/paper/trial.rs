@@ -123,7 +123,7 @@ pub fn method(method: MethodKind, law: Law) -> Setup {
 /// # Errors
 /// When the method needs more landmarks than there are.
 pub fn run<'a>(world: &'a World, setup: &Setup, start: Pose, eyes: Eyes<'a>) -> Result<Track> {
-    let parts = Parts::with_sensor(world, setup.plant, Box::new(Sighted { home_pose: world.home, eyes }));
+    let parts = Parts::with_sensor(world, setup.plant, Box::new(Sighted { home_pose: world.home, eyes }))?;
     let mut simulation = Simulation::from_parts(world, setup, parts);
     let record = simulation.run_from(0, world.home.compose(&start), &mut |_| ControlFlow::Continue(()))?;
     Ok(Track::of(&record, &world.spec.task))

@@ -74,6 +74,7 @@ impl StudyFolder {
     /// # Errors
     /// When the folder cannot be created or read, or holds anything but rows of this study made by this version.
     pub fn create(path: &Path, study: Study, source: &Path, keep_failures: bool) -> Result<Self> {
+        Table::check_parquet()?;
         let held = if path.is_dir() { files(path)? } else { Vec::new() };
         let ours = |name: &String| [MARKER, STUDY, RECORD, ROWS, PARTS, FAILURES].contains(&name.as_str());
         let known = |name: &String| ours(name) || name.starts_with(RATE) || name.ends_with(PARTIAL) || is_report(name);

@@ -15,7 +15,7 @@ use serde::Serialize;
 use crate::error::{Error, Result};
 use crate::geometry::{Pose, sin_cos};
 use crate::panorama::{Panorama, Projection};
-use crate::render::{CpuRenderer, GpuRenderer, InstructionSet, Renderer, RendererInfo, Scene, View};
+use crate::render::{self, CpuRenderer, InstructionSet, Renderer, RendererChoice, RendererInfo, Scene, View};
 use crate::study::statistics::quantile;
 use crate::world::World;
 
@@ -139,9 +139,9 @@ impl Findings {
 pub fn measure(effort: Effort, tell: &mut dyn FnMut(&Speed) -> Result<()>) -> Result<Findings> {
     let world = hall(DISCS)?;
     let scene = Scene::new(&world)?;
-    let mut gpu = match GpuRenderer::new() {
+    let mut gpu = match render::create(RendererChoice::Gpu) {
         Ok(gpu) => Some(gpu),
-        Err(Error::NoAdapter(_)) => None,
+        Err(Error::NoAdapter(_) | Error::FeatureOff { .. }) => None,
         Err(error) => return Err(error),
     };
     let mut limit = Limit::new();
@@ -162,7 +162,7 @@ pub fn measure(effort: Effort, tell: &mut dyn FnMut(&Speed) -> Result<()>) -> Re
             keep(speed)?;
         }
         if let Some(gpu) = &mut gpu {
-            let [speed] = bench.time("GPU", gpu, [Way::Batch(1)])?;
+            let [speed] = bench.time("GPU", gpu.as_mut(), [Way::Batch(1)])?;
             keep(speed)?;
         }
     }
