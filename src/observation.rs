@@ -4,7 +4,10 @@
 //! [`Observation`] a control step. None of these types holds a true pose, a true range or anything else of the simulator, so a
 //! method cannot look at the truth.
 
-use crate::geometry::{Matrix3, Pose, Twist};
+use serde::Serialize;
+use strum::{IntoStaticStr, VariantArray};
+
+use crate::geometry::{Matrix3, Pose, Twist, wrap};
 use crate::panorama::{Picture, Projection};
 
 /// Names a landmark (a feature or an object) of the home snapshot, or one met later on the way. Stable over a run.
@@ -31,6 +34,61 @@ pub struct Odometry {
     pub dt_s: f64,
 }
 
+/// A sector of the bumper around the front half of the robot.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, IntoStaticStr, VariantArray)]
+#[serde(rename_all = "kebab-case")]
+#[strum(serialize_all = "kebab-case")]
+pub enum BumperSector {
+    /// 54 to 90 degrees to the left of straight ahead.
+    Left,
+    /// 18 to 54 degrees to the left.
+    FrontLeft,
+    /// Within 18 degrees of straight ahead.
+    FrontCentre,
+    /// 18 to 54 degrees to the right.
+    FrontRight,
+    /// 54 to 90 degrees to the right.
+    Right,
+}
+
+impl BumperSector {
+    /// The sector that a contact in `direction_rad` from the robot's heading presses; `None` for one behind, which no bumper feels.
+    #[must_use]
+    pub fn at(direction_rad: f64) -> Option<Self> {
+        let width = std::f64::consts::PI / Self::VARIANTS.len() as f64;
+        let share = (std::f64::consts::FRAC_PI_2 - wrap(direction_rad)) / width;
+        (share >= 0.0).then(|| Self::VARIANTS.get(share as usize).copied()).flatten()
+    }
+
+    /// Direction of its middle from the robot's heading, rad.
+    #[must_use]
+    pub fn direction_rad(self) -> f64 {
+        let width = std::f64::consts::PI / Self::VARIANTS.len() as f64;
+        std::f64::consts::FRAC_PI_2 - (f64::from(self as u8) + 0.5) * width
+    }
+}
+
+/// Which sectors of the bumper were pressed since the last observation, for however short a time. A robot without a bumper, and one
+/// that nothing stops, never feels any.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Bumper {
+    pressed: [bool; BumperSector::VARIANTS.len()],
+}
+
+impl Bumper {
+    /// Presses the sector that a contact in `direction_rad` from the robot's heading is in.
+    pub fn press(&mut self, direction_rad: f64) {
+        if let Some(sector) = BumperSector::at(direction_rad) {
+            self.pressed[sector as usize] = true;
+        }
+    }
+
+    /// The pressed sectors, from left to right.
+    pub fn sectors(self) -> impl Iterator<Item = BumperSector> {
+        BumperSector::VARIANTS.iter().copied().filter(move |sector| self.pressed[*sector as usize])
+    }
+}
+
 /// What was seen at home, stored before the run: bearings from the home pose. Their frame is the home frame.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct HomeSnapshot {
@@ -49,6 +107,8 @@ pub struct Observation<'a> {
     pub bearings: &'a [Bearing],
     /// Heading in the home frame as a compass tells it, rad; `None` for a robot without one.
     pub compass_rad: Option<f64>,
+    /// What the bumper felt since the last observation.
+    pub bumper: Bumper,
     /// What the camera sees now; `None` for a robot that gets bearings without panoramas. The project's own methods go by
     /// bearings alone.
     pub panorama: Option<Picture<'a>>,
@@ -137,7 +197,7 @@ impl Estimate {
     /// Direction in which home lies from the robot's heading, rad.
     #[must_use]
     pub fn home_direction_rad(&self) -> f64 {
-        crate::geometry::wrap(crate::geometry::angle_of(-self.pose.position()) - self.pose.heading)
+        wrap(crate::geometry::angle_of(-self.pose.position()) - self.pose.heading)
     }
 
     /// Standard deviation of the range to home, m, to first order.
@@ -232,5 +292,22 @@ pub trait Method: Send {
     /// Why it is broken, after a step with [`Status::Failed`].
     fn failure(&self) -> Option<&str> {
         None
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_bumper_feels_the_front_half_in_five_sectors() {
+        let at = |degrees: f64| BumperSector::at(degrees.to_radians());
+        let seen = [89.0, 55.0, 53.0, 19.0, 17.0, -17.0, -19.0, -53.0, -55.0, -89.0].map(|degrees| at(degrees).unwrap() as u8);
+        assert_eq!(seen, [0, 0, 1, 1, 2, 2, 3, 3, 4, 4]);
+        assert!([91.0, -91.0, 180.0, -180.0].iter().all(|degrees| at(*degrees).is_none()));
+        assert!(BumperSector::VARIANTS.iter().all(|sector| BumperSector::at(sector.direction_rad()) == Some(*sector)));
+        let mut bumper = Bumper::default();
+        [0.1, 3.0, 1.5].into_iter().for_each(|direction| bumper.press(direction));
+        assert!(bumper.sectors().eq([BumperSector::Left, BumperSector::FrontCentre]));
     }
 }

@@ -16,7 +16,7 @@ use wayhome::estimation::paper;
 use wayhome::geometry::{Pose, Twist, Vector2, angle_of, wrap};
 use wayhome::method::{MethodKind, MethodOptions, build};
 use wayhome::observation::{
-    Bearing, Briefing, Estimate, HomeSnapshot, LandmarkId, Observation, Odometry, RobotSheet, Status, TaskSheet,
+    Bearing, Briefing, Bumper, Estimate, HomeSnapshot, LandmarkId, Observation, Odometry, RobotSheet, Status, TaskSheet,
 };
 use wayhome::random::{Seed, standard_normal};
 use wayhome::world::Draft;
@@ -152,8 +152,14 @@ fn trial(setting: &Setting, seed: u64) -> Trial {
     let mut arrived = false;
     while time < 90.0 {
         let bearings = see(&truth, &mut noise);
-        let decision =
-            method.step(&Observation { time_s: time, odometry, bearings: &bearings, compass_rad: None, panorama: None });
+        let decision = method.step(&Observation {
+            time_s: time,
+            odometry,
+            bearings: &bearings,
+            compass_rad: None,
+            bumper: Bumper::default(),
+            panorama: None,
+        });
         if let Some(estimate) = &decision.estimate {
             assert!(estimate.pose.is_finite());
             errors.push(nees(estimate, &truth));

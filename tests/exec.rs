@@ -134,8 +134,8 @@ fn a_program_is_told_what_a_robot_knows_and_nothing_more() {
         assert_eq!(lines.len(), 4, "a hello and three observations");
         let keys = |value: &Value| value.as_object().unwrap().keys().cloned().collect::<Vec<_>>().join(" ");
         assert_eq!(keys(&lines[0]), "camera compass home protocol robot task type version");
-        assert_eq!(keys(&lines[1]), "bearings compass_rad home_panorama odometry panorama time_s type");
-        assert_eq!(keys(&lines[2]), "bearings compass_rad odometry panorama time_s type");
+        assert_eq!(keys(&lines[1]), "bearings bumper compass_rad home_panorama odometry panorama time_s type");
+        assert_eq!(keys(&lines[2]), "bearings bumper compass_rad odometry panorama time_s type");
         assert_eq!(lines[0]["camera"]["width_px"], 96);
         assert!(lines[0]["compass"] == true && lines[3]["compass_rad"].is_f64() && lines[3]["time_s"] == 0.2);
 

@@ -10,6 +10,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 
 use rand::RngExt;
 use wayhome::geometry::{Pose, Twist, Vector2, cross, direction};
+use wayhome::observation::BumperSector;
 use wayhome::physics::{Collision, PlanarVelocity, Plant, RapierPlant};
 use wayhome::random::{Seed, Stream};
 use wayhome::world::{Footprint, RobotSpec, World};
@@ -195,17 +196,45 @@ fn rapier_as_a_second_opinion_agrees() {
             let mut first = None;
             for _ in 0..(seconds * 10.0) as u32 {
                 plant.step(command, 0.1);
-                first = first.or(plant.collisions().first().copied());
+                let hit = plant.collisions().first().copied();
+                first = first.or(hit.map(|hit| (hit, plant.bumper())));
             }
             (plant.truth(), first.unwrap())
         };
-        let (ours, our_hit) = run(RapierPlant::new(&world, start, Seed(1)));
-        let (theirs, their_hit) = run(RapierPlant::new(&world, start, Seed(1)).always_asking_rapier());
+        let (ours, (our_hit, our_bumper)) = run(RapierPlant::new(&world, start, Seed(1)));
+        let (theirs, (their_hit, their_bumper)) = run(RapierPlant::new(&world, start, Seed(1)).always_asking_rapier());
         let apart = (ours.position() - theirs.position()).norm();
         assert!(apart < 5e-3 && (direction(ours.heading) - direction(theirs.heading)).norm() < 0.05, "{ours:?} {theirs:?}");
         assert_eq!(our_hit.with, their_hit.with);
+        assert_eq!(our_bumper, their_bumper);
+        assert!(our_bumper.sectors().next().is_some(), "it drove forwards into something");
         assert!((our_hit.time_s - their_hit.time_s).abs() < 0.02, "{our_hit:?} {their_hit:?}");
         assert!((our_hit.impulse_n_s / their_hit.impulse_n_s - 1.0).abs() < 0.05, "{our_hit:?} {their_hit:?}");
+    }
+}
+
+/// A robot that is pushed into a wall feels it in the sector that faces the wall, and behind it nothing.
+#[test]
+fn the_bumper_feels_where_the_wall_is() {
+    use BumperSector::{FrontCentre, FrontLeft, FrontRight, Left, Right};
+    let world = world(0.0, "");
+    for (heading_deg, felt) in [
+        (0.0, Some(FrontCentre)),
+        (-30.0, Some(FrontLeft)),
+        (30.0, Some(FrontRight)),
+        (-70.0, Some(Left)),
+        (70.0, Some(Right)),
+        (110.0, None),
+        (180.0, None),
+    ] {
+        let heading = f64::to_radians(heading_deg);
+        let mut plant = RapierPlant::new(&world, Pose::new(2.0, 0.0, heading), Seed(1));
+        plant.push(velocity(1.0, 0.0, 0.0));
+        plant.step(Twist::default(), 1.5);
+        assert_eq!(plant.collisions().len(), 1, "{heading_deg}");
+        assert!(plant.bumper().sectors().eq(felt), "{heading_deg}: {:?}", plant.bumper());
+        plant.step(Twist::default(), 0.1);
+        assert!(plant.bumper().sectors().next().is_none(), "it has bounced off");
     }
 }
 

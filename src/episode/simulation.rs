@@ -256,6 +256,7 @@ impl<'a> Simulation<'a> {
             odometry: episode.odometry,
             bearings: &episode.bearings,
             compass_rad: episode.compass_rad,
+            bumper: episode.plant.bumper(),
             panorama: self.sensor.panorama().map(Panorama::picture),
         })
     }

@@ -184,8 +184,14 @@ mod tests {
         let command = ExecCommand::parse(&format!("sh -c {}", shlex::try_quote(script).unwrap())).unwrap();
         let command = command.with_time_limit(Duration::from_millis(limit_ms));
         let mut method = ExecHoming::new(command, briefing());
-        let observation =
-            Observation { time_s: 0.0, odometry: Odometry::default(), bearings: &[], compass_rad: None, panorama: None };
+        let observation = Observation {
+            time_s: 0.0,
+            odometry: Odometry::default(),
+            bearings: &[],
+            compass_rad: None,
+            bumper: crate::observation::Bumper::default(),
+            panorama: None,
+        };
         let step = |_| {
             let decision = method.step(&observation);
             std::thread::sleep(Duration::from_millis(30)); // what was not asked for has come by then

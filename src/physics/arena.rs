@@ -177,9 +177,13 @@ impl Arena {
         let pairs = self.physics.narrow_phase.contact_pairs_with(self.hull).filter(|pair| pair.has_any_active_contact());
         let first = touched.len();
         touched.extend(pairs.map(|pair| {
-            let other = if pair.collider1 == self.hull { pair.collider2 } else { pair.collider1 };
+            let is_first = pair.collider1 == self.hull;
+            let other = if is_first { pair.collider2 } else { pair.collider1 };
+            // Rapier's normals point from the first collider to the second.
+            let normals = pair.solver_manifolds().iter().map(|manifold| from_vector(manifold.data.normal));
+            let direction = normals.sum::<Vector2<f64>>() * if is_first { 1.0 } else { -1.0 };
             let mark = self.physics.colliders.get(other).map_or(0, |collider| collider.user_data);
-            Touched { with: struck(mark), impulse_n_s: impulse(pair) }
+            Touched { with: struck(mark), impulse_n_s: impulse(pair), direction }
         }));
         if touched.len() == first {
             return None;

@@ -99,7 +99,11 @@ impl Hull {
             }
         }
         let close = contacts.iter().filter(|contact| contact.gap <= TOUCH_GAP_M || contact.impulse.x > 0.0);
-        touched.extend(close.map(|contact| Touched { with: contact.with, impulse_n_s: contact.impulse.norm() }));
+        touched.extend(close.map(|contact| Touched {
+            with: contact.with,
+            impulse_n_s: contact.impulse.norm(),
+            direction: -contact.normal,
+        }));
         if contacts.iter().all(|contact| contact.impulse.x == 0.0 && contact.gap >= 0.0) {
             return chassis.drift(dt);
         }

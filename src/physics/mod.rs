@@ -44,7 +44,7 @@ mod unicycle;
 mod vicinity;
 
 use crate::geometry::{Pose, Twist, Vector2};
-use crate::observation::Odometry;
+use crate::observation::{Bumper, Odometry};
 use crate::world::{Partition, World};
 
 pub use chassis::{Chassis, PlanarVelocity, STANDARD_GRAVITY_M_S2};
@@ -109,6 +109,8 @@ struct Touched {
     with: Struck,
     /// Impulse on the robot, N s, friction included; zero where the two are merely close.
     impulse_n_s: f64,
+    /// Where on the hull, as a direction in the room from its middle.
+    direction: Vector2<f64>,
 }
 
 /// A contact between the robot's hull and a wall or body, as it begins.
@@ -137,6 +139,11 @@ pub trait Plant: Send {
     /// The contacts that began during the last interval. A plant in whose way nothing stands has none.
     fn collisions(&self) -> &[Collision] {
         &[]
+    }
+
+    /// What the bumper felt during the last interval.
+    fn bumper(&self) -> Bumper {
+        Bumper::default()
     }
 
     /// What wheels and floor do; `None` for a plant without wheels.

@@ -10,7 +10,8 @@ use super::movers::{Movers, Walkway};
 use super::script::{Event, Script};
 use super::vicinity::{Near, Scene, Vicinity};
 use super::{Collision, FloorContact, Plant, PlantStep, Struck, Touched, WheelState};
-use crate::geometry::{Pose, Twist, Vector2};
+use crate::geometry::{Pose, Twist, Vector2, angle_of};
+use crate::observation::Bumper;
 use crate::random::Seed;
 use crate::world::polygon::contains;
 use crate::world::robot::WheelFault;
@@ -55,6 +56,8 @@ pub struct RapierPlant {
     /// What happened in the last interval.
     floor_contact: FloorContact,
     collisions: Vec<Collision>,
+    /// What the bumper has felt in the interval.
+    bumper: Bumper,
 }
 
 impl RapierPlant {
@@ -87,6 +90,7 @@ impl RapierPlant {
             clock_s: 0.0,
             floor_contact,
             collisions: Vec::new(),
+            bumper: Bumper::default(),
         }
     }
 
@@ -171,7 +175,9 @@ impl RapierPlant {
     fn watch_contacts(&mut self, time_s: f64) {
         let touching = &mut self.touching;
         touching.retain(|known| self.touched.iter().any(|touched| touched.with == *known));
-        for &Touched { with, impulse_n_s } in self.touched.iter().filter(|touched| touched.impulse_n_s > 0.0) {
+        let heading = self.chassis.pose().heading;
+        for &Touched { with, impulse_n_s, direction } in self.touched.iter().filter(|touched| touched.impulse_n_s > 0.0) {
+            self.bumper.press(angle_of(direction) - heading);
             if !touching.contains(&with) {
                 touching.push(with);
                 self.collisions.push(Collision { time_s, with, impulse_n_s });
@@ -216,6 +222,7 @@ impl Plant for RapierPlant {
         let dt = dt_s / substeps;
         let mut mean = FloorContact::default();
         self.collisions.clear();
+        self.bumper = Bumper::default();
         for k in 0..substeps as u64 {
             self.substep(target, self.clock_s + k as f64 * dt, dt);
             mean.add(&self.chassis);
@@ -240,6 +247,10 @@ impl Plant for RapierPlant {
 
     fn collisions(&self) -> &[Collision] {
         &self.collisions
+    }
+
+    fn bumper(&self) -> Bumper {
+        self.bumper
     }
 
     fn wheels(&self) -> Option<WheelState> {

@@ -7,7 +7,7 @@ use base64::engine::general_purpose::STANDARD;
 use serde::{Deserialize, Serialize};
 
 use crate::geometry::{Matrix3, Pose, Twist};
-use crate::observation::{Bearing, Briefing, Decision, Estimate, Observation, Status};
+use crate::observation::{Bearing, Briefing, BumperSector, Decision, Estimate, Observation, Status};
 use crate::panorama::Picture;
 
 /// Version of what is said here. It grows when a program written for an older one would fail.
@@ -132,6 +132,8 @@ pub(super) struct Line<'a> {
     #[serde(serialize_with = "bearings")]
     bearings: &'a [Bearing],
     compass_rad: Option<f64>,
+    /// Sectors of the bumper that were pressed since the last observation.
+    bumper: Vec<BumperSector>,
     #[serde(skip_serializing_if = "Option::is_none")]
     panorama: Option<SentPicture>,
     /// With the first observation.
@@ -174,6 +176,7 @@ impl<'a> Line<'a> {
             odometry: Motion { v_m_s: odometry.twist.v, omega_rad_s: odometry.twist.omega, dt_s: odometry.dt_s },
             bearings: observation.bearings,
             compass_rad: observation.compass_rad,
+            bumper: observation.bumper.sectors().collect(),
             panorama,
             home_panorama,
         }
