@@ -8,8 +8,8 @@ use wayhome::episode::Setup;
 use wayhome::method::exec::ExecCommand;
 use wayhome::report::compare as report;
 use wayhome::study::compare::{Contender, compare, pick, runs};
-use wayhome::world::World;
 
+use super::changes::ChangeArgs;
 use super::context::{Context, Verdict, open_folder};
 use super::setup::{PatienceArgs, SetupArgs};
 use super::values::{program, range, seeds};
@@ -22,6 +22,8 @@ pub struct CompareArgs {
     /// World file, or the name of a built-in world
     #[arg(default_value = "lab")]
     pub world: String,
+    #[command(flatten)]
+    pub changes: ChangeArgs,
     /// Random starts: one a seed from A to B, both included
     #[arg(long, value_name = "A..B", default_value = "1..20", value_parser = seeds)]
     pub seeds: RangeInclusive<u64>,
@@ -56,7 +58,7 @@ pub fn run(args: &CompareArgs, context: &Context) -> Result<Verdict> {
         contenders.push(Contender::program(number, command, setup.compass_sd_rad.is_some()));
     }
     let setup = Setup { compass_sd_rad: Some(setup.compass_sd_rad.unwrap_or(0.0)), ..setup };
-    let world = World::open(&args.world)?;
+    let world = args.changes.open(&args.world)?;
     let parts = ["compare", &world.spec.name, &range(&args.seeds)];
     let (out, folder) = open_folder(args.out.as_deref(), &parts, "compare", report::FILES)?;
     let places = usize::from(args.places);

@@ -17,6 +17,7 @@ use wayhome::storage::OutputFolder;
 use wayhome::verify::dataset as speed;
 use wayhome::world::World;
 
+use super::changes::ChangeArgs;
 use super::context::{Context, Verdict, folder_or};
 use super::values::{choice, choice_of, number, pair, point, positive, shard, size};
 
@@ -35,6 +36,8 @@ pub struct DatasetArgs {
     /// World file, or the name of a built-in world
     #[arg(required = true)]
     pub world: Option<String>,
+    #[command(flatten)]
+    pub changes: ChangeArgs,
     /// Places along x and y
     #[arg(long, value_name = "NXxNY", value_parser = grid, requires = "spacing_m", required_unless_present_any = ["route", "random", "trajectory"])]
     pub grid: Option<(usize, usize)>,
@@ -170,7 +173,7 @@ pub fn run(args: &DatasetArgs, context: &Context) -> Result<Verdict> {
 }
 
 fn make(args: &DatasetArgs, context: &Context) -> Result<Verdict> {
-    let world = World::open(args.world.as_deref().unwrap_or_default())?;
+    let world = args.changes.open(args.world.as_deref().unwrap_or_default())?;
     let plan = Plan::new(&world, request(args, context))?;
     let out = folder_or(args.out.as_deref(), &["dataset", &world.spec.name, &args.seed.to_string()]);
     let mut renderer = render::create(args.renderer)?;

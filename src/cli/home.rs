@@ -17,6 +17,7 @@ use wayhome::study::sweep::Row;
 use wayhome::study::sweep::store::StudyFolder;
 use wayhome::world::World;
 
+use super::changes::ChangeArgs;
 use super::context::{Context, Verdict, folder_or, open_folder};
 use super::setup::{MethodArgs, SetupArgs};
 use super::threads::awake;
@@ -28,6 +29,8 @@ pub struct HomeArgs {
     /// World file, or the name of a built-in world
     #[arg(default_value = "worlds/lab.toml")]
     pub world: String,
+    #[command(flatten)]
+    pub changes: ChangeArgs,
     #[command(flatten)]
     pub method: MethodArgs,
     #[command(flatten)]
@@ -43,7 +46,7 @@ pub struct HomeArgs {
     pub seeds: Option<RangeInclusive<u64>>,
     /// Run an episode of a study again, exactly: the study's folder and the episode's number in its rows
     #[arg(long, value_name = "DIR:ROW", value_parser = row, conflicts_with_all =
-        ["world", "MethodArgs", "SetupArgs", "LookArgs", "start", "seed", "seeds", "initial_estimate"])]
+        ["world", "ChangeArgs", "MethodArgs", "SetupArgs", "LookArgs", "start", "seed", "seeds", "initial_estimate"])]
     pub replay: Option<(PathBuf, u64)>,
     /// Pose in the home frame at which a filter starts that has to be given one (paper-ekf): x,y,heading_deg
     #[arg(long, value_name = "x,y,heading_deg", allow_hyphen_values = true, value_parser = pose)]
@@ -79,7 +82,7 @@ pub fn run(args: &HomeArgs, context: &Context) -> Result<Verdict> {
         ..args.setup.setup()
     };
     setup.check()?;
-    let world = World::open(&args.world)?;
+    let world = args.changes.open(&args.world)?;
     match &args.seeds {
         Some(seeds) => batch(args, context, &world, &setup, seeds),
         None => Ok(verdict(&single(args, context, &world, &setup, args.seed, [&world.spec.name, &args.seed.to_string()])?)),

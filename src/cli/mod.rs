@@ -4,6 +4,7 @@
 //! into an exit code. Subcommands import [`values`], [`setup`] and [`context`], and none of them another one or this file.
 
 mod bound;
+mod changes;
 mod compare;
 mod context;
 mod dataset;

@@ -19,6 +19,7 @@ use wayhome::render::{self, Camera, Renderer, RendererChoice, RendererInfo, Scen
 use wayhome::storage::{free_memory, json};
 use wayhome::world::{CameraPreset, LightPreset, OpticsSpec, World};
 
+use super::changes::ChangeArgs;
 use super::context::{Context, Verdict, open_folder};
 use super::setup::LookArgs;
 use super::values::{choice, pose, size};
@@ -30,6 +31,8 @@ pub struct RenderArgs {
     /// World file, or the name of a built-in world
     #[arg(required_unless_present = "bench")]
     pub world: Option<String>,
+    #[command(flatten)]
+    pub changes: ChangeArgs,
     /// Pose of the robot that carries the camera
     #[arg(long, value_name = "x,y,heading_deg", allow_hyphen_values = true, value_parser = pose)]
     pub pose: Option<Pose>,
@@ -42,7 +45,7 @@ pub struct RenderArgs {
     #[arg(long)]
     pub sheet: bool,
     /// Time the renderers of this machine: panoramas a second by size, instruction set and threads, beside the filling of memory
-    #[arg(long, conflicts_with_all = ["world", "pose", "trajectory", "sheet", "light", "camera", "seed", "size", "renderer", "out"])]
+    #[arg(long, conflicts_with_all = ["world", "changes", "home", "pose", "trajectory", "sheet", "light", "camera", "seed", "size", "renderer", "out"])]
     pub bench: bool,
     #[command(flatten)]
     pub look: LookArgs,
@@ -65,7 +68,7 @@ pub fn run(args: &RenderArgs, context: &Context) -> Result<Verdict> {
         return bench::run(context);
     }
     // Clap asks for a world and for something to render where there is no `--bench`.
-    let world = World::open(args.world.as_deref().unwrap_or_default())?;
+    let world = args.changes.open(args.world.as_deref().unwrap_or_default())?;
     match (&args.pose, &args.trajectory) {
         (pose, path) if args.sheet => sheet(args, context, &world, *pose, path.as_deref())?,
         (_, Some(path)) => film(args, context, &world, path)?,
