@@ -72,7 +72,7 @@ impl<'a> DriveFiles<'a> {
     ///
     /// # Errors
     /// When a file cannot be created.
-    pub fn begin(folder: OutputFolder, world: &'a World) -> Result<Self> {
+    pub fn begin(mut folder: OutputFolder, world: &'a World) -> Result<Self> {
         let mut rows = folder.begin("drive.csv")?;
         rows.append(&columns::header(COLUMNS))?;
         let mut collisions = folder.begin("collisions.csv")?;

@@ -8,7 +8,8 @@ use std::path::{Path, PathBuf};
 use crate::error::{Error, Result};
 use crate::storage::{self, PARTIAL, io_error, write_atomically};
 
-/// File that marks a folder as ours; it holds the name of the verb that writes it.
+/// File that marks a folder as ours: the verb that writes it, and below that, a line each, files that are not among the names that
+/// the verb always writes.
 pub(crate) const MARKER: &str = ".wayhome";
 
 /// A folder of results that one verb of the program writes.
@@ -18,13 +19,16 @@ pub(crate) const MARKER: &str = ".wayhome";
 #[derive(Debug)]
 pub struct OutputFolder {
     path: PathBuf,
+    verb: String,
     names: &'static [&'static str],
+    /// Files beyond those names.
+    others: BTreeSet<String>,
     written: BTreeSet<String>,
 }
 
 impl OutputFolder {
-    /// Opens or creates the folder for `verb`, which writes files of the given names. A `#` in a name stands for any number:
-    /// `frame-#.png`; a `*` before it for any beginning: `*.svg`.
+    /// Opens or creates the folder for `verb`, which writes files of the given names, and others that the marker then lists. A `#` in a
+    /// name stands for any number: `frame-#.png`; a `*` before it for any beginning: `*.svg`.
     ///
     /// # Errors
     /// When the folder cannot be created or read, or holds what `verb` has not written.
@@ -33,22 +37,49 @@ impl OutputFolder {
         let held = files(path)?;
         let marker = path.join(MARKER);
         let refused = |found: String| Error::OutputTaken { path: path.to_owned(), found };
+        let mut others = BTreeSet::new();
         if !held.is_empty() {
             match fs::read_to_string(&marker) {
-                Ok(owner) if owner.trim_end() == verb => {}
-                Ok(owner) => return Err(refused(format!("the results of `wayhome {}`", owner.trim_end()))),
+                Ok(text) => {
+                    let mut lines = text.lines();
+                    let owner = lines.next().unwrap_or_default();
+                    if owner != verb {
+                        return Err(refused(format!("the results of `wayhome {owner}`")));
+                    }
+                    others.extend(lines.map(str::to_owned));
+                }
                 Err(e) if e.kind() == io::ErrorKind::NotFound => return Err(refused(format!("`{}`", held[0]))),
                 Err(source) => return Err(Error::Io { action: "read", path: marker, source }),
             }
         }
-        if let Some(foreign) = held.iter().find(|h| *h != MARKER && !h.ends_with(PARTIAL) && !is_announced(names, h)) {
+        let folder = Self { path: path.to_owned(), verb: verb.to_owned(), names, others, written: BTreeSet::new() };
+        if let Some(foreign) = held.iter().find(|h| *h != MARKER && !h.ends_with(PARTIAL) && !folder.is_ours(h)) {
             return Err(refused(format!("`{foreign}`")));
         }
         for partial in held.iter().filter(|h| h.ends_with(PARTIAL)) {
             remove(&path.join(partial))?;
         }
-        write_atomically(&marker, format!("{verb}\n").as_bytes())?;
-        Ok(Self { path: path.to_owned(), names, written: BTreeSet::new() })
+        folder.mark()?;
+        Ok(folder)
+    }
+
+    /// Writes down whose the folder is.
+    fn mark(&self) -> Result<()> {
+        let lines: String = std::iter::once(&self.verb).chain(&self.others).map(|line| format!("{line}\n")).collect();
+        write_atomically(&self.path.join(MARKER), lines.as_bytes())
+    }
+
+    fn is_ours(&self, name: &str) -> bool {
+        is_announced(self.names, name) || self.others.contains(name)
+    }
+
+    /// Makes sure that a file of this name is known as ours before it is there.
+    fn own(&mut self, name: &str) -> Result<()> {
+        if self.is_ours(name) {
+            return Ok(());
+        }
+        self.others.insert(name.to_owned());
+        self.mark()
     }
 
     /// Where it is.
@@ -61,11 +92,8 @@ impl OutputFolder {
     ///
     /// # Errors
     /// When the file cannot be written.
-    ///
-    /// # Panics
-    /// When `name` is none of the names that the folder was opened with, which is a fault in this program.
     pub fn write(&mut self, name: &str, bytes: &[u8]) -> Result<()> {
-        assert!(is_announced(self.names, name), "`{name}` is not announced");
+        self.own(name)?;
         write_atomically(&self.path.join(name), bytes)?;
         self.written.insert(name.to_owned());
         Ok(())
@@ -76,11 +104,8 @@ impl OutputFolder {
     ///
     /// # Errors
     /// When the file cannot be created.
-    ///
-    /// # Panics
-    /// As [`Self::write`].
-    pub fn begin(&self, name: &'static str) -> Result<FolderFile> {
-        assert!(self.names.contains(&name), "`{name}` is not announced");
+    pub fn begin(&mut self, name: &'static str) -> Result<FolderFile> {
+        self.own(name)?;
         Ok(FolderFile { name, path: self.path.join(name), file: storage::GrowingFile::create(&self.path.join(name))? })
     }
 
@@ -98,9 +123,12 @@ impl OutputFolder {
     ///
     /// # Errors
     /// When a file cannot be removed.
-    pub fn finish(self) -> Result<()> {
-        let stale = |name: &String| is_announced(self.names, name) && !self.written.contains(name);
-        files(&self.path)?.iter().filter(|name| stale(name)).try_for_each(|name| remove(&self.path.join(name)))
+    pub fn finish(mut self) -> Result<()> {
+        let stale = |name: &String| self.is_ours(name) && !self.written.contains(name);
+        files(&self.path)?.iter().filter(|name| stale(name)).try_for_each(|name| remove(&self.path.join(name)))?;
+        let known = self.others.len();
+        self.others.retain(|name| self.written.contains(name));
+        if self.others.len() < known { self.mark() } else { Ok(()) }
     }
 }
 
@@ -181,6 +209,21 @@ mod tests {
         let mut held: Vec<_> = fs::read_dir(&path).unwrap().map(|e| e.unwrap().file_name()).collect();
         held.sort();
         assert_eq!(held, [".wayhome", "a.txt"], "what is stale is gone");
+    }
+
+    /// What is written under a name that nobody announced is ours as well, the next time and when it is stale.
+    #[test]
+    fn a_file_needs_no_announcement() {
+        let base = tempfile::tempdir().unwrap();
+        let open = || OutputFolder::open(base.path(), "home", NAMES);
+        open().unwrap().write("extra.csv", b"1").unwrap();
+        let mut second = open().unwrap();
+        second.write("a.txt", b"2").unwrap();
+        second.finish().unwrap();
+        assert_eq!(files(base.path()).unwrap(), [".wayhome", "a.txt"]);
+        assert_eq!(fs::read_to_string(base.path().join(MARKER)).unwrap(), "home\n");
+        fs::write(base.path().join("extra.csv"), "mine").unwrap();
+        assert!(open().unwrap_err().to_string().contains("extra.csv"), "it is no longer ours");
     }
 
     #[test]
