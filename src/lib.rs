@@ -37,29 +37,42 @@
 //! [`estimation`] says where home is, its [`control`] turns the wheels. The types of an observation hold no truth, so a method
 //! cannot look at it.
 //!
-//! An [`episode`] joins a plant, a sensor and a method, closes the loop and keeps the record.
+//! An [`episode`] joins a plant, a [`sensor`] and a [`method`] and keeps the record. Its
+//! [`Simulation`](episode::Simulation) is stepped, command in and observation out; the closed loop is one of its callers.
 //!
 //! ```
 //! use std::ops::ControlFlow;
-//! use wayhome::episode::{SensorKind, Simulation, Outcome, PlantKind, Setup};
+//! use wayhome::episode::{Outcome, PlantKind, SensorKind, Setup, Simulation};
 //! use wayhome::world::World;
 //!
 //! let world = World::open("lab")?;
 //! let setup = Setup { plant: PlantKind::Unicycle, sensor: SensorKind::Noisy, ..Setup::default() };
-//! let record = Simulation::new(&world, &setup)?.run(7, &mut |_| ControlFlow::Continue(()))?;
+//! let mut simulation = Simulation::new(&world, &setup)?;
+//! let first = simulation.reset(7)?; // what a method sees at the start of the run of seed 7
+//! assert!(!first.bearings.is_empty());
+//! let record = simulation.run(7, &mut |_| ControlFlow::Continue(()))?; // the same run, driven by the setup's method
 //! assert_eq!(record.outcome, Outcome::Home);
 //! # Ok::<(), wayhome::Error>(())
 //! ```
 //!
-//! A [`study`] repeats episodes, a [`report`] writes what came of them.
+//! A [`record`]er keeps a run as it happens, a [`study`] repeats episodes, a [`report`] writes what came of them, and
+//! [`verify`] holds the project against closed forms and other programs.
 //!
 //! # Floors
 //!
-//! Each module imports only what lies below it. From the top: the command line; [`report`]; [`study`] and [`verify`]; [`record`];
-//! [`episode`]; then side by side [`sensor`], [`method`] and [`dataset`]; then, blind to one another, [`physics`], [`render`],
-//! [`vision`], [`estimation`] and [`control`], with [`draw`] beside them; then [`world`], [`panorama_set`] and [`observation`]; at
-//! the bottom [`panorama`], [`document`]s, [`fault`]s, [`geometry`], [`ode`], [`random`] streams, [`table`]s, [`storage`] and
-//! [`error`]s.
+//! Each room imports only what lies below it; rooms of one floor do not import one another unless an arrow says so. The first
+//! lines of each say what it knows of.
+//!
+//! ```text
+//! 8  the command line (src/cli, main.rs)
+//! 7  report -> study          pages of finished work         verify   the project held against others
+//! 6  study -> record          many episodes
+//! 5  record -> episode        one recorder a format          episode  a simulation that is stepped
+//! 4  sensor   method   dataset
+//! 3  physics   render   vision   estimation   control        draw     charts, maps, sheets
+//! 2  world   panorama_set   observation
+//! 1  panorama   document   fault   storage   table   command_line   error   geometry   ode   random
+//! ```
 //!
 //! # Features
 //!

@@ -3,6 +3,8 @@
 //! A [`Method`] is built from a [`Briefing`] (the home snapshot, the robot's own data sheet, the task) and then gets one
 //! [`Observation`] a control step. None of these types holds a true pose, a true range or anything else of the simulator, so a
 //! method cannot look at the truth.
+//!
+//! Knows of: geometry and pictures. Must not know of any truth.
 
 use serde::Serialize;
 use strum::{IntoStaticStr, VariantArray};

@@ -2,6 +2,8 @@
 //!
 //! Results go to stdout, diagnostics and progress to stderr. A subcommand returns a [`Verdict`] or an error; `main` turns that
 //! into an exit code. Subcommands import [`values`], [`setup`] and [`context`], and none of them another one or this file.
+//!
+//! Knows of: everything below; nothing imports it.
 
 mod bound;
 mod changes;

@@ -3,6 +3,8 @@
 //! A law steers; a governor sets the speed. Both see only an estimate's pose and the data sheets, never the simulator.
 //! [`printed`] has the paper's laws as they stand in the paper, for its reproduction; [`vectors`] the laws that make a direction
 //! of bearings alone.
+//!
+//! Knows of: an estimate's pose and the data sheets. Must not know of the simulator.
 
 pub mod printed;
 pub mod vectors;

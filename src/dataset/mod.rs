@@ -8,6 +8,8 @@
 //!
 //! The bytes of a set follow from its command alone: not from the number of threads, nor from how often the work was
 //! interrupted, nor from how it was split over machines.
+//!
+//! Knows of: worlds, the renderer and the layouts of sets. Must not know of episodes.
 
 pub mod check;
 pub mod conditions;

@@ -1,4 +1,6 @@
 //! Drawing: charts, maps of rooms, contact sheets, and the coding of pictures.
+//!
+//! Knows of: worlds, panoramas and numbers. Must not know of episodes or studies.
 
 pub mod chart;
 pub mod image;

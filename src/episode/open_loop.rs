@@ -1,6 +1,6 @@
 //! Open loop: a table of commands drives the robot, and nobody looks where it goes.
 //!
-//! [`Commands`] is the table, checked as a whole before anything moves. [`drive`] runs it on a [`RapierPlant`] and hands on truth,
+//! [`Commands`] is the table, checked as a whole before anything moves. [`drive`] runs it on a [`RapierPlant`](crate::physics::RapierPlant) and hands on truth,
 //! odometry, wheels and floor contacts side by side, a [`DriveStep`] at a time; [`DriveSummary`] is that in numbers.
 
 use std::ops::ControlFlow;

@@ -36,7 +36,7 @@ impl<'a> Parts<'a> {
     /// A plant by name and a sensor of a caller's own.
     ///
     /// # Errors
-    /// [`Error::FeatureOff`] where this build has no such plant.
+    /// [`FeatureOff`](crate::Error::FeatureOff) where this build has no such plant.
     pub fn with_sensor(world: &'a World, kind: PlantKind, sensor: Box<dyn Sensor + 'a>) -> Result<Self> {
         Ok(Self { plant: plant(world, kind)?, sensor })
     }

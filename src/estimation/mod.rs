@@ -4,6 +4,8 @@
 //! - [`paper`]: the paper's six-state EKF, exactly as printed but for the transition Jacobian; it must be started near the truth.
 //! - [`observability`]: what of the paper's state its bearings can tell at all.
 //! - [`resection`] and [`gaussian`] serve the anchored filter.
+//!
+//! Knows of: bearings and odometry. Must not know of pictures, worlds or the truth.
 
 pub mod anchored;
 mod dense;

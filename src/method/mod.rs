@@ -2,6 +2,8 @@
 //!
 //! Everything here sees a [`Briefing`] and [`Observation`]s only. The one number a person may add is the pose that the paper's
 //! filter is started from, because that filter cannot start from nothing.
+//!
+//! Knows of: observations, estimators and control laws. Must not know of worlds, plants, sensors or any truth.
 
 pub mod exec;
 mod paper;

@@ -21,6 +21,8 @@
 //!
 //! Whatever a set's own sense of azimuth, [`PanoramaSet::load`] gives a [`Panorama`](crate::panorama::Panorama) whose columns run
 //! anti-clockwise. A [`Grid`] says where the places of a set lie about its home.
+//!
+//! Knows of: panoramas and files. Must not know of worlds or renderers.
 
 mod document;
 mod encode;

@@ -21,6 +21,8 @@
 //! Rapier works in f32. At 7 m from the origin a substep's 0.3 mm is 630 units in the last place, so rounding alone would
 //! bend and stretch paths by up to 0.1 %. Asking it only where bodies move one another keeps that out, makes the closed forms
 //! of friction and of hits hold in the full plant to f64 accuracy, and is some five times as fast.
+//!
+//! Knows of: worlds. Must not know of rendering, vision or estimation; `arena` alone knows rapier.
 
 #[cfg(feature = "rapier")]
 mod arena;

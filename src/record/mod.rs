@@ -1,4 +1,4 @@
-//! What is kept of a run while it goes on, and when it has ended: one [`Recorder`](crate::episode::Recorder) a format.
+//! What is kept of a run while it goes on, and when it has ended: one [`Recorder`] a format.
 //!
 //! An [MCAP](https://mcap.dev) file holds all that happens as messages for Foxglove, Rerun and the readers of that format; an animated
 //! GIF shows the panorama above the room. Both go straight to disk, so that a long run needs no more memory than a short one,

@@ -16,6 +16,8 @@
 //! - Textures are prefiltered, alike along both axes. Light is ambient and Lambert's, without shadows.
 //! - A camera's blur, noise and dirt change colours alone: range and instance ids stay exact.
 //! - The CPU renderer's pictures are the same bytes on every machine and any number of threads.
+//!
+//! Knows of: worlds and panoramas. Must not know of physics or vision; `gpu` alone knows wgpu.
 
 mod batch;
 mod camera;

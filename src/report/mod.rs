@@ -2,6 +2,8 @@
 //!
 //! Reports know results, not how they came about. All files go through an [`OutputFolder`](crate::storage::OutputFolder), which
 //! writes each of them whole or not at all and refuses to touch a folder that holds anything else.
+//!
+//! Knows of: finished studies, recordings and drawing. Must not know how the results came about.
 
 pub mod bound;
 pub mod compare;

@@ -4,6 +4,8 @@
 //! [`RenderedSensor`] looks through the camera and the feature extractor, [`DatasetSensor`] at panoramas on disk, [`IdealSensor`] takes the bearings of the landmark
 //! bodies from geometry, and [`NoisySensor`] spoils those with noise, drop-outs and false matches. A [`DegradedSensor`] makes any
 //! of them worse, for studies of robustness; a [`CompassSensor`] adds a compass to any of them.
+//!
+//! Knows of: the true world, the renderer, the extractor and panorama sets. Must not know of methods.
 
 mod compass;
 mod dataset;

@@ -13,7 +13,7 @@ pub fn csv<T: Serialize>(records: impl IntoIterator<Item = T>) -> String {
     text(table)
 }
 
-/// [`csv`] with columns before those of the records, whose names are known at run time only.
+/// [`csv()`] with columns before those of the records, whose names are known at run time only.
 #[must_use]
 pub fn csv_with<T: Serialize>(names: &[&str], records: &[(Vec<String>, T)]) -> String {
     let tails = csv(records.iter().map(|(_, record)| record));

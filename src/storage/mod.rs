@@ -1,4 +1,6 @@
 //! Files on disk that appear whole or not at all, their fingerprints, and how much room is left for more.
+//!
+//! Knows of: files and errors.
 
 mod csv;
 mod folder;

@@ -1,4 +1,6 @@
 //! Studies: many episodes, and what they say together.
+//!
+//! Knows of: episodes and what they leave. Must not know how a page shows it.
 
 pub mod bound;
 pub mod compare;

@@ -1,4 +1,7 @@
 //! The project held against closed forms, other programs and its own speed.
+//!
+//! Knows of: physics, renderer, extractor and data sets from outside, and drawing. Must not know of studies but for their
+//! statistics.
 
 pub mod dataset;
 #[cfg(feature = "rapier")]

@@ -9,6 +9,8 @@
 //!
 //! Only azimuths leave this module: elevations, scales and the motion found serve to refuse wrong matches and are not
 //! handed on. SURF, which the homing literature uses, is not: this detector is an open one.
+//!
+//! Knows of: panoramas. Must not know of worlds, renderers or the truth.
 
 mod describe;
 mod detect;

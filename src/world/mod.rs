@@ -4,6 +4,8 @@
 //! every fault of a file at once; see [`Fault`](crate::fault::Fault). It goes through three gates: the text becomes a tree that knows its
 //! lines ([`document`](crate::document)), the tree is compared with the schema (`structure`), and the spec's values and places are checked
 //! (`validate`); the images that it shows are read on the way (`picture`). A [`World`] also tells where a robot may stand and start (`free`).
+//!
+//! Knows of: geometry, panoramas' projections and located documents. Must not know of rapier, wgpu or anything that moves.
 
 mod camera;
 pub mod convex;
