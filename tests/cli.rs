@@ -528,9 +528,9 @@ fn observability_is_mapped_for_any_world() {
 }
 
 #[test]
-fn the_physics_report_holds_its_closed_forms() {
+fn the_physics_page_holds_its_closed_forms() {
     let folder = tempfile::tempdir().unwrap();
-    let output = run(folder.path(), &["physics-report", "--json", "--out", "page"]);
+    let output = run(folder.path(), &["verify", "physics", "--json", "--out", "page"]);
     assert_done(&output);
     let printed: Value = serde_json::from_slice(&output.stdout).unwrap();
     let page = std::fs::read_to_string(folder.path().join("page/README.md")).unwrap();
@@ -541,6 +541,12 @@ fn the_physics_report_holds_its_closed_forms() {
         assert!(page.contains(&drawing) && folder.path().join("page").join(&drawing).is_file(), "{drawing}");
     }
     assert!(page.contains("| 0 rises |"), "{page}");
+    // What an older version has written may be written again, also by the old name.
+    let marker = folder.path().join("page/.wayhome");
+    std::fs::write(&marker, "physics-report\n").unwrap();
+    assert_done(&run(folder.path(), &["physics-report", "--out", "page"]));
+    assert_eq!(std::fs::read_to_string(marker).unwrap(), "verify physics\n");
+    assert_fails(&run(folder.path(), &["verify", "vision", "--out", "page"]), 1, &["verify physics"]);
 }
 
 #[test]
@@ -585,10 +591,10 @@ fn a_trajectory_becomes_a_film_and_a_sheet() {
 }
 
 #[test]
-fn the_vision_report_keeps_its_pairs_to_itself() {
+fn the_vision_page_keeps_its_pairs_to_itself() {
     let folder = tempfile::tempdir().unwrap();
     let report = |threads: &str, pairs: &str, out: &str| {
-        let arguments = ["vision-report", LAB, "--axis", "distance", "--keypoints", "150", "--pairs", pairs, "--out", out];
+        let arguments = ["verify", "vision", LAB, "--axis", "distance", "--keypoints", "150", "--pairs", pairs, "--out", out];
         run(folder.path(), &[&arguments[..], &["--json", "--threads", threads]].concat())
     };
     let output = report("2", "pairs", "page");

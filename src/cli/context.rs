@@ -89,11 +89,6 @@ impl Context {
         Ok(Self { json: args.json, show_progress, stopped, command, matches })
     }
 
-    /// Whether the user asked the command to stop.
-    pub fn is_stopped(&self) -> bool {
-        self.stopped.load(Ordering::Relaxed)
-    }
-
     /// The workers of a study, which Ctrl-C stops.
     pub fn pool(&self) -> Pool<'_> {
         Pool { threads: rayon::current_num_threads(), stopped: &self.stopped }

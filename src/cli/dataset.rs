@@ -13,9 +13,6 @@ use wayhome::dataset::plan::{Headings, Places, Plan, Request};
 use wayhome::panorama_set::LayoutKind;
 use wayhome::render::{self, RendererChoice};
 use wayhome::report::dataset as report;
-use wayhome::storage::OutputFolder;
-use wayhome::verify::dataset as speed;
-use wayhome::world::World;
 
 use super::changes::ChangeArgs;
 use super::context::{Context, Verdict, folder_or};
@@ -95,18 +92,9 @@ pub enum DatasetCommand {
         /// Folder of the set
         dir: PathBuf,
     },
-    /// How fast sets are made, beside rendering and encoding alone, and what codings of pictures cost
-    Bench {
-        /// World file, or the name of a built-in world
-        #[arg(long, default_value = "lab")]
-        world: String,
-        /// Panoramas of a round
-        #[arg(long, value_name = "N", default_value = "1500", value_parser = clap::value_parser!(u32).range(1..=100_000))]
-        frames: u32,
-        /// Folder for the page [default: none]
-        #[arg(long, value_name = "DIR")]
-        out: Option<PathBuf>,
-    },
+    /// The same as `wayhome verify dataset`
+    #[command(hide = true)]
+    Bench(super::verify::DatasetArgs),
 }
 
 /// Headings as the command line has them.
@@ -167,7 +155,7 @@ struct Checked<'a> {
 pub fn run(args: &DatasetArgs, context: &Context) -> Result<Verdict> {
     match &args.command {
         Some(DatasetCommand::Check { dir }) => inspect(dir, context),
-        Some(DatasetCommand::Bench { world, frames, out }) => bench(world, *frames as usize, out.as_deref(), context),
+        Some(DatasetCommand::Bench(args)) => super::verify::dataset(args, context),
         None => make(args, context),
     }
 }
@@ -259,20 +247,5 @@ fn inspect(dir: &Path, context: &Context) -> Result<Verdict> {
     if !whole {
         bail!("{}: {} faults; remove what is extra and run the command of its README again", dir.display(), found.faults.len());
     }
-    Ok(Verdict::Done)
-}
-
-fn bench(world: &str, frames: usize, out: Option<&Path>, context: &Context) -> Result<Verdict> {
-    let world = World::open(world)?;
-    let folder = out.map(|out| OutputFolder::open(out, "dataset bench", report::FILES)).transpose()?;
-    let bar = context.progress(None)?;
-    let found = speed::measure(&world, frames, &std::env::temp_dir(), &|what| bar.at(what.to_owned()))?;
-    drop(bar);
-    if let Some(mut folder) = folder {
-        folder.write("README.md", report::speed_page(&found).as_bytes())?;
-        folder.write("speed.json", wayhome::storage::json(&found).as_bytes())?;
-        folder.finish()?;
-    }
-    context.print(&found, || report::speed_text(&found))?;
     Ok(Verdict::Done)
 }

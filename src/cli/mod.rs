@@ -1,7 +1,8 @@
 //! The command line: one file a subcommand, each with its arguments and a `run(args, context)`.
 //!
 //! Results go to stdout, diagnostics and progress to stderr. A subcommand returns a [`Verdict`] or an error; `main` turns that
-//! into an exit code. Subcommands import [`values`], [`setup`] and [`context`], and none of them another one or this file.
+//! into an exit code. Subcommands import [`values`], [`setup`] and [`context`], and none of them another one or this file;
+//! but `render --bench` and `dataset bench` are old names of parts of [`verify`].
 //!
 //! Knows of: everything below; nothing imports it.
 
@@ -13,16 +14,14 @@ mod dataset;
 mod drive;
 mod home;
 mod observability;
-mod physics_report;
 mod render;
-mod render_report;
 mod reproduce;
 mod robustness;
 mod setup;
 mod sweep;
 mod threads;
 mod values;
-mod vision_report;
+mod verify;
 mod world;
 
 use anyhow::Result;
@@ -57,8 +56,17 @@ enum Command {
     Home(Box<home::HomeArgs>),
     /// Drive a table of commands open loop and record truth, odometry, wheels, slip and forces
     Drive(drive::DriveArgs),
-    /// Hold the physics against its closed forms: a page of charts, and the slip map
-    PhysicsReport(physics_report::PhysicsReportArgs),
+    /// Hold the project against closed forms, other programs and its own speed, each as a page
+    Verify(verify::VerifyArgs),
+    /// The same as `verify physics`
+    #[command(hide = true)]
+    PhysicsReport(verify::PhysicsArgs),
+    /// The same as `verify vision`
+    #[command(hide = true)]
+    VisionReport(verify::VisionArgs),
+    /// The same as `verify render`
+    #[command(hide = true)]
+    RenderReport(verify::RenderArgs),
     /// Every method from the same starts: success, time, path, final error, AAE, catchment area
     Compare(Box<compare::CompareArgs>),
     /// Rebuild the paper's tables and figures beside the printed numbers, and audit its claims
@@ -71,13 +79,9 @@ enum Command {
     Sweep(Box<sweep::SweepArgs>),
     /// Cramer-Rao bound of range, bearing and heading along a path, and the filter's errors beside it
     Bound(bound::BoundArgs),
-    /// Hold the extractor against ground truth: a page of tables and charts
-    VisionReport(vision_report::VisionReportArgs),
     /// Render panoramas with range and instance ids: of a pose, along a trajectory, or several on a sheet
     Render(Box<render::RenderArgs>),
-    /// How fast the renderer is and what it shows: a page with the speeds, and sheets of all worlds and presets
-    RenderReport(render_report::RenderReportArgs),
-    /// Panorama sets with ground truth in the field's layouts; their check; how fast they are made
+    /// Panorama sets with ground truth in the field's layouts, and their check
     Dataset(Box<dataset::DatasetArgs>),
     /// Check, draw and describe world files
     World(world::WorldArgs),
@@ -104,13 +108,14 @@ pub fn run() -> Result<Verdict> {
         Command::Drive(args) => drive::run(&args, context),
         Command::Home(args) => home::run(&args, context),
         Command::Observability(args) => observability::run(&args, context),
-        Command::PhysicsReport(args) => physics_report::run(&args, context),
+        Command::PhysicsReport(args) => verify::physics(&args, context),
         Command::Render(args) => render::run(&args, context),
-        Command::RenderReport(args) => render_report::run(&args, context),
+        Command::RenderReport(args) => verify::render(&args, context),
         Command::Reproduce(args) => reproduce::run(&args, context),
         Command::Robustness(args) => robustness::run(&args, context),
         Command::Sweep(args) => sweep::run(&args, context),
-        Command::VisionReport(args) => vision_report::run(&args, context),
+        Command::Verify(args) => verify::run(&args, context),
+        Command::VisionReport(args) => verify::vision(&args, context),
         Command::World(args) => world::run(&args, context),
     }
 }

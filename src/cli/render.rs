@@ -1,7 +1,5 @@
 //! `wayhome render`: panoramas of a pose or along a way, contact sheets, and how fast all that is.
 
-pub mod bench;
-
 use std::path::{Path, PathBuf};
 
 use anyhow::Result;
@@ -65,7 +63,7 @@ pub struct RenderArgs {
 
 pub fn run(args: &RenderArgs, context: &Context) -> Result<Verdict> {
     if args.bench {
-        return bench::run(context);
+        return super::verify::render_bench(context);
     }
     // Clap asks for a world and for something to render where there is no `--bench`.
     let world = args.changes.open(args.world.as_deref().unwrap_or_default())?;

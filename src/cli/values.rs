@@ -238,7 +238,7 @@ mod tests {
         check::<LayoutKind>();
         check::<Axis>();
         check::<Target>();
-        check::<wayhome::verify::vision::conditions::Axis>();
+        check::<wayhome::verify::vision::condition::Factor>();
     }
 
     #[test]

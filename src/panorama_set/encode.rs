@@ -1,6 +1,6 @@
 //! Panoramas as the bytes of picture files.
 //!
-//! Which compression and filter serve a channel best was measured: `wayhome dataset bench` makes the table again. Colours and
+//! Which compression and filter serve a channel best was measured: `wayhome verify dataset` makes the table again. Colours and
 //! ranges are predicted by Paeth's filter, instances by the row above, and all go through fdeflate, which is some three times
 //! as fast on them as zlib's fastest level.
 

@@ -1,4 +1,4 @@
-//! What goes with a data set: its card; and the page on how fast sets are made.
+//! What goes with a data set: its card, and what a check of it found.
 
 use std::fmt::Write;
 
@@ -7,10 +7,6 @@ use crate::draw::sheet::Sheet;
 use crate::error::Result;
 use crate::panorama::Panorama;
 use crate::panorama_set::{Document, Layout};
-use crate::verify::dataset::Findings;
-
-/// Names of the files of the page on speed.
-pub const FILES: &[&str] = &["README.md", "speed.json"];
 
 /// The card of a set and its example pictures, by name.
 ///
@@ -132,84 +128,5 @@ pub fn inspection(found: &Inspection, folder: &std::path::Path) -> String {
     }
     let good = if found.faults.is_empty() { "OK".to_owned() } else { format!("{} faults", found.faults.len()) };
     let _ = writeln!(text, "{}: {good}, {} files, {:.1} MB", folder.display(), found.files, found.bytes as f64 / 1e6);
-    text
-}
-
-/// The page on speed.
-#[must_use]
-pub fn speed_page(f: &Findings) -> String {
-    let mut text = format!(
-        "# Making data sets\n\nMade by `wayhome dataset bench --out results/dataset` with wayhome {}. Processor: {}. World: `{}`.\n\n## The whole way to disk\n\n\
-         Colours, range and instances as PNG, truth, sums; CPU renderer; random poses; medians of rounds of {} panoramas that take \
-         turns. Panoramas a second:\n\n\
-         | size | layout | threads | rendering alone | encoding alone | the whole | of the slower alone | most that is possible | \
-         rendering, one thread | encoding, one thread | the whole of the slower of these |\n|---|---|---|---|---|---|---|---|---|---|---|\n",
-        crate::VERSION,
-        f.processor,
-        f.world,
-        f.rates.first().map_or(0, |r| r.frames)
-    );
-    for r in &f.rates {
-        let _ = writeln!(
-            text,
-            "| {} x {} | `{}` | {} | {:.0} | {:.0} | {:.0} | {:.0} % | {:.0} % | {:.0} | {:.0} | {:.0} % |",
-            r.width,
-            r.height,
-            r.layout.name(),
-            r.threads,
-            r.render_per_s,
-            r.encode_per_s,
-            r.pipeline_per_s,
-            100.0 * r.share_of_slower(),
-            100.0 * r.bound_per_s() / r.render_per_s.min(r.encode_per_s),
-            r.render_one_per_s,
-            r.encode_one_per_s,
-            100.0 * r.share_of_slower_one()
-        );
-    }
-    text += "\nRendering and encoding both keep every processor busy, so that together they cannot be as fast as the slower of them with all \
-             processors to itself: \"most that is possible\" is the inverse of the sum of their times. The last column holds the whole against the \
-             slower of the two with one thread each, which is what a pipeline of one thread a stage comes to at best. `folder` is a file for each \
-             picture and for its truth, which costs the operating system time; `webdataset` puts them into archives.\n\n## Codings\n\n";
-    let [width, height] = f.codings_px;
-    let _ = write!(
-        text,
-        "One thread, panoramas of {width} x {height}. Length is that of the file over that of the pixels. In use: fdeflate with Paeth's filter \
-         for colours and range, with the row above for instances.\n\n| channel | coding | ms | length |\n|---|---|---|---|\n"
-    );
-    for c in &f.codings {
-        let _ = writeln!(text, "| {} | {} | {:.2} | {:.3} |", c.channel, c.coding, c.ms, c.share);
-    }
-    text += "\nmtpng is not in the table: it spreads one picture over threads, which are all busy with a picture each here, and compresses by zlib's \
-             levels, whose fastest is.\n";
-    text
-}
-
-/// The rates, for a terminal.
-#[must_use]
-pub fn speed_text(f: &Findings) -> String {
-    let mut text = String::new();
-    for r in &f.rates {
-        let _ = writeln!(
-            text,
-            "{} x {}, {}, {} threads: rendering {:.0}/s, encoding {:.0}/s, whole {:.0}/s: {:.0} % of the slower, of {:.0} % possible; \
-             {:.0} % of the slower on one thread each ({:.0}/s, {:.0}/s)",
-            r.width,
-            r.height,
-            r.layout.name(),
-            r.threads,
-            r.render_per_s,
-            r.encode_per_s,
-            r.pipeline_per_s,
-            100.0 * r.share_of_slower(),
-            100.0 * r.bound_per_s() / r.render_per_s.min(r.encode_per_s),
-            100.0 * r.share_of_slower_one(),
-            r.render_one_per_s,
-            r.encode_one_per_s
-        );
-    }
-    for c in &f.codings {
-        let _ = writeln!(text, "{:8} {:20} {:7.2} ms {:.3}", c.channel, c.coding, c.ms, c.share);
-    }
     text
 }

@@ -33,6 +33,14 @@ impl OutputFolder {
     /// # Errors
     /// When the folder cannot be created or read, or holds what `verb` has not written.
     pub fn open(path: &Path, verb: &str, names: &'static [&'static str]) -> Result<Self> {
+        Self::open_renamed(path, verb, verb, names)
+    }
+
+    /// As [`Self::open`] for a verb that was called `former` once: what it wrote under that name may be written again too.
+    ///
+    /// # Errors
+    /// As [`Self::open`].
+    pub fn open_renamed(path: &Path, verb: &str, former: &str, names: &'static [&'static str]) -> Result<Self> {
         fs::create_dir_all(path).map_err(io_error("create folder", path))?;
         let held = files(path)?;
         let marker = path.join(MARKER);
@@ -43,7 +51,7 @@ impl OutputFolder {
                 Ok(text) => {
                     let mut lines = text.lines();
                     let owner = lines.next().unwrap_or_default();
-                    if owner != verb {
+                    if ![verb, former].contains(&owner) {
                         return Err(refused(format!("the results of `wayhome {owner}`")));
                     }
                     others.extend(lines.map(str::to_owned));

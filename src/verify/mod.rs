@@ -5,7 +5,10 @@
 
 pub mod dataset;
 #[cfg(feature = "rapier")]
+mod outside;
+#[cfg(feature = "rapier")]
 pub mod physics;
 pub mod render;
+mod speed;
 #[cfg(feature = "rapier")]
 pub mod vision;

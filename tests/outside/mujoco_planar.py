@@ -3,7 +3,7 @@
 
     python3 -m venv .venv && .venv/bin/pip install mujoco==4.0.0
     .venv/bin/python tests/outside/mujoco_planar.py
-    target/release/wayhome physics-report --out results/physics
+    target/release/wayhome verify physics --out results/physics
 
 writes results/physics/mujoco.csv; the report then shows it. Not part of CI: it needs MuJoCo, and the table only changes when
 the physics does.

@@ -2,9 +2,9 @@
 """OpenCV's ORB, SIFT and AKAZE on the pairs of wayhome's report on vision.
 
     python3 -m venv .venv && .venv/bin/pip install 'opencv-python-headless==4.14.*'
-    target/release/wayhome vision-report --pairs results/runs/pairs
+    target/release/wayhome verify vision --pairs results/runs/pairs
     .venv/bin/python tests/outside/opencv_features.py results/runs/pairs
-    target/release/wayhome vision-report
+    target/release/wayhome verify vision
 
 The first run of the report writes the panoramas, the script scores OpenCV on them and writes results/vision/opencv.csv, and
 the second run shows it. Not part of CI: it needs OpenCV, and the table only changes when the panoramas do.
@@ -12,7 +12,7 @@ the second run shows it. Not part of CI: it needs OpenCV, and the table only cha
 The rule is the report's, written anew: a match is right within 3 pixels of where the range of the home panorama puts its
 feature, and if nothing hides that place. Matching is brute force with the ratio test at 0.8 and mutual nearest neighbours.
 Strips are padded cyclically so that the seam is no border; features in the padding are dropped. Rows `wayhome` are
-the extractor of this project with as many keypoints, through `wayhome vision-report --axis distance`.
+the extractor of this project with as many keypoints, through `wayhome verify vision --axis distance`.
 """
 
 import argparse
@@ -116,7 +116,7 @@ def opencv(world, home, shots):
 def wayhome(binary, worlds):
     for keypoints in OURS:
         with tempfile.TemporaryDirectory() as out:
-            command = [binary, "vision-report", *worlds, "--axis", "distance", "--keypoints", str(keypoints), "--out", out,
+            command = [binary, "verify", "vision", *worlds, "--axis", "distance", "--keypoints", str(keypoints), "--out", out,
                        "--threads", "1", "--json"]
             study = json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
         for cell in study["cells"]:
@@ -126,7 +126,7 @@ def wayhome(binary, worlds):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("pairs", type=pathlib.Path, help="folder that `wayhome vision-report --pairs` has written")
+    parser.add_argument("pairs", type=pathlib.Path, help="folder that `wayhome verify vision --pairs` has written")
     parser.add_argument("--wayhome", default="target/release/wayhome")
     parser.add_argument("--out", type=pathlib.Path, default=pathlib.Path("results/vision/opencv.csv"))
     args = parser.parse_args()

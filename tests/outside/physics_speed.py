@@ -3,7 +3,7 @@
 
     cargo bench --bench physics
     python3 tests/outside/physics_speed.py
-    target/release/wayhome physics-report --out results/physics
+    target/release/wayhome verify physics --out results/physics
 
 writes results/physics/speed.csv from what criterion left in target/criterion: the median time of a substep in each benchmark.
 """

@@ -1,12 +1,13 @@
 //! The page on the physics: a chart for each closed form, the slip map, and the comparison with another engine.
 
-use std::collections::BTreeMap;
 use std::fmt::Write;
 
+use super::{ClosedForm, SlipMap, Validation};
 use crate::draw::chart::{Axis, Chart, HeatMap, Mark, Ramp, Stroke};
-use crate::error::{Error, Result};
+use crate::draw::markdown::table;
+use crate::error::Result;
 use crate::storage::OutputFolder;
-use crate::verify::physics::{ClosedForm, SlipMap};
+use crate::verify::outside;
 
 /// Names of all files of the page. [`OUTSIDE`] comes from outside and is kept as it is.
 pub const FILES: &[&str] = &[
@@ -29,57 +30,46 @@ pub const FILES: &[&str] = &[
     SPEED,
 ];
 
-/// Trajectories of the same drives in another engine, written by `tests/outside/mujoco_planar.py`.
-pub const OUTSIDE: &str = "mujoco.csv";
+/// Trajectories of the same drives in another engine.
+const OUTSIDE: &str = "mujoco.csv";
 
-/// What the benchmark measured, written by `tests/outside/physics_speed.py`.
-pub const SPEED: &str = "speed.csv";
+/// What the benchmark measured.
+const SPEED: &str = "speed.csv";
 
-/// All that the page shows.
-#[derive(Debug, Clone)]
-pub struct Findings {
-    /// Closed forms with what was measured.
-    pub closed_forms: Vec<ClosedForm>,
-    /// Energy over time: (friction, curve).
-    pub energy: Vec<(f64, Vec<[f64; 2]>)>,
-    /// End error over substep, (s, m).
-    pub convergence: Vec<[f64; 2]>,
-    /// Odometry drift over friction and acceleration.
-    pub slip_map: SlipMap,
-    /// The text of [`OUTSIDE`] where the folder has one.
-    pub outside: Option<String>,
-    /// The text of [`SPEED`] where the folder has one.
-    pub speed: Option<String>,
-}
-
-/// Writes the page and its drawings.
+/// Writes the page and its drawings. What another engine made of the same drives and what the benchmark measured is shown if it
+/// lies in the folder.
 ///
 /// # Errors
-/// When a file cannot be written, or the trajectories from outside are not what their script writes.
-pub fn write(mut folder: OutputFolder, findings: &Findings) -> Result<()> {
-    let outside = findings.outside.as_deref().map(OutsideDrives::parse).transpose()?;
-    for form in &findings.closed_forms {
-        let Some(name) = FILES.iter().find(|f| f.strip_suffix(".svg") == Some(form.name)) else { continue };
-        folder.write(name, closed_form_svg(form).as_bytes())?;
+/// When a file cannot be written, or a table from outside is not what its script writes.
+pub fn write(mut folder: OutputFolder, found: &Validation) -> Result<()> {
+    let drives = outside::keep(&mut folder, OUTSIDE, "tests/outside/mujoco_planar.py")?.map(drives);
+    let speeds = outside::keep(&mut folder, SPEED, "tests/outside/physics_speed.py")?;
+    for form in &found.closed_forms {
+        folder.write(&format!("{}.svg", form.name), closed_form_svg(form).as_bytes())?;
     }
-    folder.write("energy.svg", energy_svg(&findings.energy).as_bytes())?;
-    folder.write("convergence.svg", convergence_svg(&findings.convergence).as_bytes())?;
-    folder.write("slip-map.svg", slip_map_svg(&findings.slip_map).as_bytes())?;
-    if let (Some(drives), Some(text)) = (&outside, &findings.outside) {
-        folder.write(OUTSIDE, text.as_bytes())?;
-        folder.write("mujoco.svg", drives.svg().as_bytes())?;
+    folder.write("energy.svg", energy_svg(&found.energy).as_bytes())?;
+    folder.write("convergence.svg", convergence_svg(&found.convergence).as_bytes())?;
+    folder.write("slip-map.svg", slip_map_svg(&found.slip_map).as_bytes())?;
+    if let Some(drives) = &drives {
+        folder.write("mujoco.svg", drives_svg(drives).as_bytes())?;
     }
-    let speed = findings.speed.as_deref().map(Speed::parse).transpose()?;
-    if let Some(text) = &findings.speed {
-        folder.write(SPEED, text.as_bytes())?;
-    }
-    folder.write("README.md", page(findings, outside.as_ref(), speed.as_ref()).as_bytes())?;
+    folder.write("README.md", page(found, drives.as_deref(), speeds.as_deref()).as_bytes())?;
     folder.finish()
 }
 
+/// The greatest differences, for a terminal.
+#[must_use]
+pub fn text(found: &Validation) -> String {
+    let line = |form: &ClosedForm| {
+        let (difference, allowed) = (100.0 * form.greatest_difference(), 100.0 * form.tolerance);
+        format!("{:20} {:44} off by {difference:9.5} % at most, {allowed} % allowed\n", form.name, form.equation)
+    };
+    found.closed_forms.iter().map(line).collect()
+}
+
 fn closed_form_svg(form: &ClosedForm) -> String {
-    let axis = |k: usize| if form.log[k] { Axis::log(form.axes[k]) } else { Axis::linear(form.axes[k]) };
-    let mut chart = Chart::new(form.title, axis(0), axis(1));
+    let [x, y] = form.axes.map(Axis::linear);
+    let mut chart = Chart::new(form.title, x, y);
     let many = form.curves.len() > 1;
     for (k, curve) in form.curves.iter().enumerate() {
         let stroke = if many { Stroke::series(k) } else { Stroke::EXACT };
@@ -90,7 +80,7 @@ fn closed_form_svg(form: &ClosedForm) -> String {
         let mark = if many { Mark::series(k) } else { Mark::MEASURED };
         chart = chart.points(curve.measured.iter().copied(), &mark, &format!("measured, {}", curve.label));
     }
-    chart.note(form.equation).note(format!("greatest difference {}", percent(form.worst))).to_svg()
+    chart.note(form.equation).note(format!("greatest difference {}", percent(form.greatest_difference()))).to_svg()
 }
 
 fn energy_svg(curves: &[(f64, Vec<[f64; 2]>)]) -> String {
@@ -140,105 +130,71 @@ fn slip_map_svg(map: &SlipMap) -> String {
     .to_svg()
 }
 
-/// The same drives here and in another engine.
-struct OutsideDrives {
-    drives: Vec<OutsideDrive>,
-}
-
-struct OutsideDrive {
+/// A drive here and in another engine.
+struct Drive {
     name: String,
     /// Time; then x, y, heading here, here with wheels that hardly creep, and there.
     rows: Vec<[f64; 10]>,
 }
 
-impl OutsideDrives {
-    fn parse(text: &str) -> Result<Self> {
-        let fault = |line: usize| Error::Parse {
-            path: OUTSIDE.into(),
-            message: format!("line {line}: expected a name and ten numbers, as tests/outside/mujoco_planar.py writes them"),
-        };
-        let mut drives: Vec<OutsideDrive> = Vec::new();
-        for (line, number) in text.lines().zip(1..).skip(1) {
-            let (name, rest) = line.split_once(',').ok_or_else(|| fault(number))?;
-            let cells: Vec<f64> = rest.split(',').map_while(|cell| cell.parse().ok()).collect();
-            let row: [f64; 10] = cells.try_into().map_err(|_| fault(number))?;
-            match drives.last_mut() {
-                Some(drive) if drive.name == name => drive.rows.push(row),
-                _ => drives.push(OutsideDrive { name: name.to_owned(), rows: vec![row] }),
-            }
+/// The rows of the table by drive.
+fn drives(table: Vec<(String, [f64; 10])>) -> Vec<Drive> {
+    let mut drives: Vec<Drive> = Vec::new();
+    for (name, row) in table {
+        match drives.last_mut() {
+            Some(drive) if drive.name == name => drive.rows.push(row),
+            _ => drives.push(Drive { name, rows: vec![row] }),
         }
-        Ok(Self { drives })
     }
-
-    fn svg(&self) -> String {
-        let chart = Chart::new("The same drives here and in MuJoCo", Axis::linear("x (m)"), Axis::linear("y (m)"));
-        let chart = self.drives.iter().enumerate().fold(chart, |chart, (k, drive)| {
-            chart.line(drive.rows.iter().map(|r| [r[1], r[2]]), &Stroke::series(k), &drive.name)
-        });
-        let every = |rows: &[[f64; 10]]| (rows.len() / 16).max(1);
-        self.drives
-            .iter()
-            .enumerate()
-            .fold(chart, |chart, (k, drive)| {
-                let points = drive.rows.iter().step_by(every(&drive.rows)).map(|r| [r[7], r[8]]);
-                chart.points(points, &Mark { radius_px: 2.8, ..Mark::series(k) }, "")
-            })
-            .note("lines: wayhome")
-            .note("points: MuJoCo")
-            .to_svg()
-    }
-
-    fn table(&self) -> String {
-        let mut text = "| drive | path, m | apart at the end, mm | at most, mm | heading, deg | with little creep: at the end, mm | at most, mm | heading, deg |\n\
-            |---|---|---|---|---|---|---|---|\n"
-            .to_owned();
-        for drive in &self.drives {
-            let Some(end) = drive.rows.last() else { continue };
-            let length: f64 = drive.rows.windows(2).map(|w| libm::hypot(w[1][1] - w[0][1], w[1][2] - w[0][2])).sum();
-            let _ = write!(text, "| {} | {length:.2} ", drive.name);
-            for k in [1, 4] {
-                let apart = |r: &[f64; 10]| 1e3 * libm::hypot(r[7] - r[k], r[8] - r[k + 1]);
-                let most = drive.rows.iter().map(apart).fold(0.0, f64::max);
-                let turn = (100.0 * crate::geometry::wrap(end[9] - end[k + 2]).to_degrees()).round() / 100.0 + 0.0; // no -0
-                let _ = write!(text, "| {:.2} | {most:.2} | {turn:.2} ", apart(end));
-            }
-            text += "|\n";
-        }
-        text
-    }
+    drives
 }
 
-/// Nanoseconds that a substep takes in each benchmark, by name.
-struct Speed(BTreeMap<String, f64>);
-
-impl Speed {
-    fn parse(text: &str) -> Result<Self> {
-        let row = |(line, number): (&str, usize)| {
-            let time = line.split_once(',').and_then(|(name, ns)| Some((name.to_owned(), ns.parse().ok()?)));
-            time.ok_or_else(|| Error::Parse {
-                path: SPEED.into(),
-                message: format!("line {number}: expected a name and a number, as tests/outside/physics_speed.py writes them"),
-            })
-        };
-        text.lines().zip(1..).skip(1).map(row).collect::<Result<_>>().map(Self)
+fn drives_svg(drives: &[Drive]) -> String {
+    let mut chart = Chart::new("The same drives here and in MuJoCo", Axis::linear("x (m)"), Axis::linear("y (m)"));
+    for (k, drive) in drives.iter().enumerate() {
+        chart = chart.line(drive.rows.iter().map(|r| [r[1], r[2]]), &Stroke::series(k), &drive.name);
     }
+    for (k, drive) in drives.iter().enumerate() {
+        let points = drive.rows.iter().step_by((drive.rows.len() / 16).max(1)).map(|r| [r[7], r[8]]);
+        chart = chart.points(points, &Mark { radius_px: 2.8, ..Mark::series(k) }, "");
+    }
+    chart.note("lines: wayhome").note("points: MuJoCo").to_svg()
+}
 
-    fn table(&self) -> String {
-        let mut text = "| scene | substeps a second and core | of the time rapier's |\n|---|---|---|\n".to_owned();
-        let push = |group: &str| self.0.get(&format!("{group}/pushing a carton"));
-        for (name, ns) in self.0.iter().filter(|(name, _)| !name.starts_with("rapier/pushing")) {
-            let share = match (push("rapier"), name.as_str()) {
-                (Some(rapier), "plant/pushing a carton") => format!("{:.0} %", 100.0 * rapier / ns),
-                (_, "rapier/in every substep") => self
-                    .0
-                    .get("plant/open floor")
-                    .map_or_else(String::new, |ours| format!("{:.0} %", 100.0 * (1.0 - ours / ns))),
-                _ => "none".to_owned(),
-            };
-            let _ = writeln!(text, "| `{name}` | {} | {share} |", rounded(1e9 / ns));
+fn drives_table(drives: &[Drive]) -> String {
+    let row = |drive: &Drive| {
+        let end = drive.rows.last()?;
+        let length: f64 = drive.rows.windows(2).map(|w| libm::hypot(w[1][1] - w[0][1], w[1][2] - w[0][2])).sum();
+        let mut row = vec![drive.name.clone(), format!("{length:.2}")];
+        for k in [1, 4] {
+            let apart = |r: &[f64; 10]| 1e3 * libm::hypot(r[7] - r[k], r[8] - r[k + 1]);
+            let most = drive.rows.iter().map(apart).fold(0.0, f64::max);
+            let turn = (100.0 * crate::geometry::wrap(end[9] - end[k + 2]).to_degrees()).round() / 100.0 + 0.0; // no -0
+            row.extend([apart(end), most, turn].map(|value| format!("{value:.2}")));
         }
-        text
-    }
+        Some(row)
+    };
+    let columns = "drive | path, m | apart at the end, mm | at most, mm | heading, deg | with little creep: at the end, mm | at most, mm | heading, deg";
+    table(columns, drives.iter().filter_map(row))
+}
+
+/// The table of what each benchmark takes for a substep, ns.
+fn speed_table(speeds: &[(String, f64)]) -> String {
+    let time = |name: &str| speeds.iter().find(|(other, _)| other == name).map(|(_, ns)| *ns);
+    let percent = |share: f64| format!("{:.0} %", 100.0 * share);
+    let row = |(name, ns): &(String, f64)| {
+        let share = match (time("rapier/pushing a carton"), name.as_str()) {
+            (Some(rapier), "plant/pushing a carton") => percent(rapier / ns),
+            (_, "rapier/in every substep") => {
+                time("plant/open floor").map_or_else(String::new, |ours| percent(1.0 - ours / ns))
+            }
+            _ => "none".to_owned(),
+        };
+        [format!("`{name}`"), rounded(1e9 / ns), share]
+    };
+    let mut shown: Vec<_> = speeds.iter().filter(|(name, _)| !name.starts_with("rapier/pushing")).collect();
+    shown.sort_by(|a, b| a.0.cmp(&b.0));
+    table("scene | substeps a second and core | of the time rapier's", shown.into_iter().map(row))
 }
 
 /// A large number, to two digits or so.
@@ -254,29 +210,24 @@ fn percent(share: f64) -> String {
     }
 }
 
-fn page(findings: &Findings, outside: Option<&OutsideDrives>, speed: Option<&Speed>) -> String {
+fn page(found: &Validation, drives: Option<&[Drive]>, speeds: Option<&[(String, f64)]>) -> String {
     let mut text = format!(
         "# The physics against its closed forms\n\n\
-        Made by `wayhome physics-report --out results/physics` with wayhome {}. Lines are equations, points are the plant of the\n\
+        Made by `wayhome verify physics --out results/physics` with wayhome {}. Lines are equations, points are the plant of the\n\
         program at its substep of 1 ms. The same equations are tests in `tests/physics.rs` and `tests/physics_settings.rs`. Robot:\n\
-        an iRobot Create 3 with equal wheels and, where the equation asks for it, its weight on the two wheels alone.\n\n\
-        | what | equation | greatest difference | allowed by the tests |\n|---|---|---|---|\n",
+        an iRobot Create 3 with equal wheels and, where the equation asks for it, its weight on the two wheels alone.\n\n",
         crate::VERSION
     );
-    for form in &findings.closed_forms {
-        let _ = writeln!(
-            text,
-            "| [{}](#{}) | `{}` | {} | {} % |",
-            form.title,
-            form.name,
-            form.equation,
-            percent(form.worst),
-            100.0 * form.tolerance
-        );
-    }
-    let rises = findings.energy.iter().flat_map(|(_, curve)| curve.windows(2)).filter(|w| w[1][1] > w[0][1] * (1.0 + 1e-14));
-    let _ = write!(text, "| [Energy](#energy) | never rises | {} rises | none |\n\n", rises.count());
-    for form in &findings.closed_forms {
+    let rises = found.energy.iter().flat_map(|(_, curve)| curve.windows(2)).filter(|w| w[1][1] > w[0][1] * (1.0 + 1e-14));
+    let energy = ["[Energy](#energy)".into(), "never rises".into(), format!("{} rises", rises.count()), "none".into()];
+    let rows = found.closed_forms.iter().map(|form| {
+        let title = format!("[{}](#{})", form.title, form.name);
+        let allowed = format!("{} %", 100.0 * form.tolerance);
+        [title, format!("`{}`", form.equation), percent(form.greatest_difference()), allowed]
+    });
+    text += &table("what | equation | greatest difference | allowed by the tests", rows.chain([energy]));
+    text.push('\n');
+    for form in &found.closed_forms {
         let _ = write!(
             text,
             "<a id=\"{}\"></a>\n## {}\n\n`{}`. {}\n\n![{}]({}.svg)\n\n",
@@ -291,18 +242,15 @@ fn page(findings: &Findings, outside: Option<&OutsideDrives>, speed: Option<&Spe
              a turn on the spot between them. Wheels are perfectly calibrated and encoders fine, so all of it is slip. Above the\n\
              dashed line a = mu g the wheels must spin and skid, by v^2/2 (1/(mu g) - 1/a) on a straight leg; below it only creep\n\
              is left, which grows as the acceleration nears the limit.\n\n![Slip map](slip-map.svg)\n";
-    if let Some(drives) = outside {
-        text += "\n## The same drives in MuJoCo\n\n";
-        text += OUTSIDE_STORY;
-        text += "\n\n";
-        text += &drives.table();
-        text += "\n![MuJoCo](mujoco.svg)\n";
+    if let Some(drives) = drives {
+        let _ = write!(
+            text,
+            "\n## The same drives in MuJoCo\n\n{OUTSIDE_STORY}\n\n{}\n![MuJoCo](mujoco.svg)\n",
+            drives_table(drives)
+        );
     }
-    if let Some(speed) = speed {
-        text += "\n## Speed\n\n";
-        text += SPEED_STORY;
-        text += "\n\n";
-        text += &speed.table();
+    if let Some(speeds) = speeds {
+        let _ = write!(text, "\n## Speed\n\n{SPEED_STORY}\n\n{}", speed_table(speeds));
     }
     text
 }

@@ -16,15 +16,13 @@ use crate::error::{Error, Result};
 use crate::geometry::{Pose, sin_cos};
 use crate::panorama::{Panorama, Projection};
 use crate::render::{self, CpuRenderer, InstructionSet, Renderer, RendererChoice, RendererInfo, Scene, View};
-use crate::study::statistics::quantile;
+use crate::verify::speed::{Memory, median, pool_of, processor, seconds};
 use crate::world::World;
 
 /// Sizes that are measured: small, usual, and that of the paper.
 pub const SIZES: [(u32, u32); 3] = [(561, 81), (1440, 180), (4680, 480)];
 /// Numbers of bodies between which the cost of bodies shows.
 pub const BODIES: [usize; 5] = [10, 30, 100, 300, 1000];
-/// Bytes whose filling is the limit.
-const LIMIT_BYTES: usize = 256 << 20;
 /// Walls and discs of the world that is measured in.
 const WALLS: usize = 40;
 const DISCS: usize = 20;
@@ -65,16 +63,9 @@ pub fn hall(discs: usize) -> Result<World> {
     World::from_toml(&text, "hall")
 }
 
-/// Seconds that go into the figures.
-#[derive(Debug, Clone, Copy)]
-pub struct Effort {
-    /// For each figure, s.
-    pub seconds: f64,
-}
-
 /// How fast something renders.
 #[derive(Debug, Clone, Serialize)]
-pub struct Speed {
+pub struct Throughput {
     /// What renders.
     pub what: String,
     /// Columns.
@@ -95,7 +86,7 @@ pub struct Speed {
 
 /// What the CPU renderer takes for a picture among so many bodies.
 #[derive(Debug, Clone, Copy, Serialize)]
-pub struct Cost {
+pub struct BodyCost {
     /// Number of bodies.
     pub bodies: usize,
     /// Time of a panorama, s.
@@ -104,7 +95,7 @@ pub struct Cost {
 
 /// All that is measured.
 #[derive(Debug, Clone, Serialize)]
-pub struct Findings {
+pub struct RenderSpeeds {
     /// Name of the processor.
     pub processor: String,
     /// The CPU renderer.
@@ -113,14 +104,14 @@ pub struct Findings {
     pub gpu: Option<RendererInfo>,
     /// Size by size: CPU, instruction set by instruction set, one picture at a time; the widest in batches, on one thread and on
     /// two; then the GPU.
-    pub speeds: Vec<Speed>,
+    pub speeds: Vec<Throughput>,
     /// Size at which bodies are counted.
     pub bodies_size: (u32, u32),
     /// The cost of bodies on one thread.
-    pub bodies: Vec<Cost>,
+    pub bodies: Vec<BodyCost>,
 }
 
-impl Findings {
+impl RenderSpeeds {
     /// How many times as fast two threads are as one, in batches on the widest instruction set, size by size.
     #[must_use]
     pub fn speedups(&self) -> Vec<((u32, u32), f64)> {
@@ -132,78 +123,45 @@ impl Findings {
     }
 }
 
-/// Measures all of it. `tell` hears each figure as it comes, and stops the study with an error.
+/// Measures all of it; `seconds` go into each figure. `tell` hears each as it comes, and stops the study with an error.
 ///
 /// # Errors
 /// What rendering fails with, and what `tell` returns.
-pub fn measure(effort: Effort, tell: &mut dyn FnMut(&Speed) -> Result<()>) -> Result<Findings> {
-    let world = hall(DISCS)?;
-    let scene = Scene::new(&world)?;
+pub fn measure(seconds: f64, tell: &mut dyn FnMut(&Throughput) -> Result<()>) -> Result<RenderSpeeds> {
     let mut gpu = match render::create(RendererChoice::Gpu) {
         Ok(gpu) => Some(gpu),
         Err(Error::NoAdapter(_) | Error::FeatureOff { .. }) => None,
         Err(error) => return Err(error),
     };
-    let mut limit = Limit::new();
-    let mut speeds = Vec::new();
+    let mut memory = Memory::new();
+    let workload = Workload::new(DISCS, seconds)?;
+    let mut speeds: Vec<Throughput> = Vec::new();
     for size in SIZES {
-        let mut bench = Bench { scene: &scene, world: &world, size, effort, limit: &mut limit };
-        let mut keep = |speed: Speed| -> Result<()> {
-            tell(&speed)?;
-            speeds.push(speed);
+        let mut time = |what: &str, renderer: &mut dyn Renderer, ways: &[Way]| {
+            for speed in workload.time(what, size, renderer, ways, &mut memory)? {
+                tell(&speed)?;
+                speeds.push(speed);
+            }
             Ok(())
         };
         for set in InstructionSet::ALL.into_iter().filter(|set| set.is_available()) {
-            let [speed] = bench.time(&format!("CPU, {set}"), &mut CpuRenderer::on(set)?, [Way::One])?;
-            keep(speed)?;
+            time(&format!("CPU, {set}"), &mut CpuRenderer::on(set)?, &[Way::One])?;
         }
-        let what = format!("CPU, {}, batch", InstructionSet::best());
-        for speed in bench.time(&what, &mut CpuRenderer::new(), [Way::Batch(1), Way::Batch(2)])? {
-            keep(speed)?;
-        }
+        let batches = [Way::Batch(1), Way::Batch(2)];
+        time(&format!("CPU, {}, batch", InstructionSet::best()), &mut CpuRenderer::new(), &batches)?;
         if let Some(gpu) = &mut gpu {
-            let [speed] = bench.time("GPU", gpu.as_mut(), [Way::Batch(1)])?;
-            keep(speed)?;
+            time("GPU", gpu.as_mut(), &[Way::Batch(1)])?;
         }
     }
     let bodies_size = SIZES[1];
     let mut bodies = Vec::new();
     for count in BODIES {
-        let world = hall(count)?;
-        let scene = Scene::new(&world)?;
-        let mut bench = Bench { scene: &scene, world: &world, size: bodies_size, effort, limit: &mut limit };
-        let [speed] = bench.time("", &mut CpuRenderer::new(), [Way::One])?;
-        bodies.push(Cost { bodies: count, panorama_s: 1.0 / speed.panoramas_per_s });
+        let workload = Workload::new(count, seconds)?;
+        let speeds = workload.time("", bodies_size, &mut CpuRenderer::new(), &[Way::One], &mut memory)?;
+        bodies.extend(speeds.iter().map(|speed| BodyCost { bodies: count, panorama_s: 1.0 / speed.panoramas_per_s }));
     }
     let (cpu, gpu) = (CpuRenderer::new().info().clone(), gpu.map(|g| g.info().clone()));
-    Ok(Findings { processor: processor(), cpu, gpu, speeds, bodies_size, bodies })
-}
-
-/// Name of the processor, where the system tells it.
-pub(super) fn processor() -> String {
-    let known = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
-    let line = known.lines().find_map(|l| l.strip_prefix("model name")?.split_once(':'));
-    line.map_or_else(|| std::env::consts::ARCH.to_owned(), |(_, name)| name.trim().to_owned())
-}
-
-/// Memory that is filled as fast as one thread can.
-struct Limit {
-    bytes: Vec<u8>,
-}
-
-impl Limit {
-    fn new() -> Self {
-        // Written once, so that the pages are there.
-        Self { bytes: vec![1; LIMIT_BYTES] }
-    }
-
-    /// Bytes a second.
-    fn time(&mut self) -> f64 {
-        let began = Instant::now();
-        self.bytes.fill(black_box(0));
-        black_box(&mut self.bytes);
-        LIMIT_BYTES as f64 / began.elapsed().as_secs_f64()
-    }
+    Ok(RenderSpeeds { processor: processor(), cpu, gpu, speeds, bodies_size, bodies })
 }
 
 /// How pictures are asked for.
@@ -216,9 +174,8 @@ enum Way {
 }
 
 /// One way of asking, and what was timed of it.
-struct Lane {
+struct Runs {
     way: Way,
-    threads: usize,
     pool: rayon::ThreadPool,
     /// Pictures of a run.
     length: usize,
@@ -230,91 +187,95 @@ struct Lane {
     fills: Vec<f64>,
 }
 
-impl Lane {
+impl Runs {
     fn new(way: Way) -> Result<Self> {
         let threads = match way {
             Way::One => 1,
             Way::Batch(threads) => threads,
         };
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-        let pool = pool.map_err(|error| Error::Threads(error.to_string()))?;
-        Ok(Self { way, threads, pool, length: 4, out: Panorama::empty(), rates: Vec::new(), fills: Vec::new() })
+        Ok(Self { way, pool: pool_of(threads)?, length: 4, out: Panorama::empty(), rates: Vec::new(), fills: Vec::new() })
     }
 }
 
-/// A place to time renderers in.
-struct Bench<'a> {
-    scene: &'a Scene,
-    world: &'a World,
-    size: (u32, u32),
-    effort: Effort,
-    limit: &'a mut Limit,
+/// A hall to time renderers in.
+struct Workload {
+    world: World,
+    scene: Scene,
+    bodies: Vec<Pose>,
+    /// Time that goes into a figure, s.
+    seconds: f64,
 }
 
-impl Bench<'_> {
+impl Workload {
+    fn new(discs: usize, seconds: f64) -> Result<Self> {
+        let world = hall(discs)?;
+        Ok(Self { scene: Scene::new(&world)?, bodies: world.body_poses(), world, seconds })
+    }
+
     /// Times a renderer, each way in turn.
-    fn time<const N: usize>(&mut self, what: &str, renderer: &mut dyn Renderer, ways: [Way; N]) -> Result<[Speed; N]> {
-        let mut lanes = ways.into_iter().map(Lane::new).collect::<Result<Vec<_>>>()?;
+    fn time(
+        &self,
+        what: &str,
+        (width, height): (u32, u32),
+        renderer: &mut dyn Renderer,
+        ways: &[Way],
+        memory: &mut Memory,
+    ) -> Result<Vec<Throughput>> {
+        let projection = self.world.projection_of_size(width, height);
+        let mut all = ways.iter().map(|way| Runs::new(*way)).collect::<Result<Vec<_>>>()?;
         let began = Instant::now();
-        let mut fill = self.limit.time();
-        while lanes.iter().any(|lane| lane.rates.len() < 5) || began.elapsed().as_secs_f64() < N as f64 * self.effort.seconds {
-            for lane in &mut lanes {
-                let elapsed = self.run(renderer, lane)?;
-                let before = std::mem::replace(&mut fill, self.limit.time());
+        let mut fill = memory.fill_bytes_per_s();
+        while all.iter().any(|runs| runs.rates.len() < 5) || began.elapsed().as_secs_f64() < ways.len() as f64 * self.seconds {
+            for runs in &mut all {
+                let elapsed = self.run(renderer, projection, runs)?;
+                let before = std::mem::replace(&mut fill, memory.fill_bytes_per_s());
                 // A run is so long that its ends do not count, nor the pages that it asks the system for, nor caches that were emptied
                 // by filling memory.
-                if elapsed < 0.2 * self.effort.seconds {
-                    lane.length *= 2;
-                    lane.rates.clear();
-                    lane.fills.clear();
+                if elapsed < 0.2 * self.seconds {
+                    runs.length *= 2;
+                    runs.rates.clear();
+                    runs.fills.clear();
                 } else {
-                    lane.rates.push(lane.length as f64 / elapsed);
-                    lane.fills.extend([before, fill]);
+                    runs.rates.push(runs.length as f64 / elapsed);
+                    runs.fills.extend([before, fill]);
                 }
             }
         }
-        let (width, height) = self.size;
-        let median = |values: &[f64]| quantile(values, 0.5).unwrap_or(f64::NAN);
-        Ok(std::array::from_fn(|k| {
-            let lane = &lanes[k];
-            let (panoramas_per_s, fill_bytes_per_s) = (median(&lane.rates), median(&lane.fills));
+        let throughput = |runs: &Runs| {
+            let (panoramas_per_s, fill_bytes_per_s) = (median(&runs.rates), median(&runs.fills));
             let colour_bytes_per_s = 4.0 * f64::from(width) * f64::from(height) * panoramas_per_s;
-            Speed {
+            Throughput {
                 what: what.to_owned(),
                 width,
                 height,
-                threads: lane.threads,
+                threads: runs.pool.current_num_threads(),
                 panoramas_per_s,
                 colour_bytes_per_s,
                 fill_bytes_per_s,
                 share: colour_bytes_per_s / fill_bytes_per_s,
             }
-        }))
+        };
+        Ok(all.iter().map(throughput).collect())
     }
 
     /// Seconds that a run takes.
-    fn run(&self, renderer: &mut dyn Renderer, lane: &mut Lane) -> Result<f64> {
-        let (width, height) = self.size;
-        let bodies = self.world.body_poses();
-        let views = views(self.world.projection_of_size(width, height), &bodies, lane.length, lane.rates.len());
-        let (way, out) = (lane.way, &mut lane.out);
-        let started = Instant::now();
-        lane.pool.install(|| match way {
+    fn run(&self, renderer: &mut dyn Renderer, projection: Projection, runs: &mut Runs) -> Result<f64> {
+        let views = views(projection, &self.bodies, runs.length, runs.rates.len());
+        let (way, out, scene) = (runs.way, &mut runs.out, &self.scene);
+        let mut look = |_: usize, panoramas: &mut [Panorama]| {
+            // Keeps the compiler from leaving out what nobody looks at.
+            black_box(panoramas);
+            Ok(())
+        };
+        let work = || match way {
             Way::One => views.iter().try_for_each(|view| {
-                renderer.render(self.scene, view, out)?;
-                black_box(&*out);
-                Ok(())
+                renderer.render(scene, view, out)?;
+                look(0, std::slice::from_mut(out))
             }),
-            Way::Batch(_) => renderer.render_batch(self.scene, &views, &mut look),
-        })?;
-        Ok(started.elapsed().as_secs_f64())
+            Way::Batch(_) => renderer.render_batch(scene, &views, &mut look),
+        };
+        seconds(|| runs.pool.install(work))
     }
-}
-
-/// Keeps the compiler from leaving out what nobody looks at.
-fn look(_: usize, panoramas: &mut [Panorama]) -> Result<()> {
-    black_box(panoramas);
-    Ok(())
 }
 
 /// Views around the middle of the hall, other ones in each round.
@@ -336,13 +297,10 @@ mod tests {
         for discs in BODIES {
             assert_eq!(hall(discs).unwrap().bodies.len(), discs);
         }
-        let world = hall(10).unwrap();
-        let scene = Scene::new(&world).unwrap();
-        let mut limit = Limit { bytes: vec![1; 1 << 16] };
-        let effort = Effort { seconds: 0.02 };
-        let mut bench = Bench { scene: &scene, world: &world, size: (64, 8), effort, limit: &mut limit };
-        let speeds = bench.time("CPU", &mut CpuRenderer::new(), [Way::One, Way::Batch(2)]).unwrap();
-        assert_eq!(speeds.each_ref().map(|s| s.threads), [1, 2]);
+        let workload = Workload::new(10, 0.02).unwrap();
+        let ways = [Way::One, Way::Batch(2)];
+        let speeds = workload.time("CPU", (64, 8), &mut CpuRenderer::new(), &ways, &mut Memory::new()).unwrap();
+        assert_eq!(speeds.iter().map(|s| s.threads).collect::<Vec<_>>(), [1, 2]);
         assert!(speeds.iter().all(|s| s.panoramas_per_s > 0.0 && s.share > 0.0), "{speeds:?}");
     }
 }

@@ -2,10 +2,16 @@
 
 use std::fmt::Write;
 
+use super::{RenderSpeeds, Throughput};
+use crate::dataset::film;
+use crate::draw::markdown::table;
 use crate::draw::sheet::Sheet;
 use crate::error::Result;
+use crate::geometry::Twist;
+use crate::panorama::Panorama;
+use crate::random::Seed;
+use crate::render::{Camera, CpuRenderer, Scene, View};
 use crate::storage::{OutputFolder, json};
-use crate::verify::render::{Findings, Speed};
 use crate::world::{CameraPreset, LightPreset, World};
 
 /// Names of all files of the page.
@@ -24,52 +30,94 @@ pub const FILES: &[&str] = &[
     "camera.png",
 ];
 
-/// Sheet of the light presets, one below the other.
-pub const LIGHT: &str = "light.png";
-/// Sheet of the camera presets.
-pub const CAMERA: &str = "camera.png";
+/// Size of the pictures on the sheets.
+const SIZE_PX: (u32, u32) = (560, 70);
+/// Poses on the sheet of a world.
+const POSES: usize = 3;
+/// World that shows the presets.
+const SHOWROOM: &str = "gallery";
 
-/// Writes the page: what was measured, a sheet for each world with its file's name, and those of the presets.
+/// The sheets of the page with their files' names: one for each world, one for the presets of light and one for those of cameras.
+///
+/// # Errors
+/// When a world cannot be rendered.
+pub fn sheets() -> Result<Vec<(String, Sheet)>> {
+    let mut sheets = Vec::new();
+    for name in World::builtin_names() {
+        sheets.push((format!("{name}.png"), world_sheet(&World::open(name)?)?));
+    }
+    let showroom = World::open(SHOWROOM)?;
+    let scene = Scene::new(&showroom)?;
+    let light = LightPreset::ALL.map(|light| (light, CameraPreset::Ideal, Twist::default()));
+    let camera = CameraPreset::ALL.map(|camera| (LightPreset::Day, camera, Twist { v: 0.2, omega: 1.5 }));
+    sheets.push(("light.png".into(), presets_sheet(&showroom, &scene, &light)?));
+    sheets.push(("camera.png".into(), presets_sheet(&showroom, &scene, &camera)?));
+    Ok(sheets)
+}
+
+/// Home and some places of a world, under its own light, as its own camera sees them.
+fn world_sheet(world: &World) -> Result<Sheet> {
+    let scene = Scene::new(world)?;
+    let (mut camera, mut renderer) = (Camera::new(world.spec.camera.optics), CpuRenderer::new());
+    let (mut sheet, mut panorama, bodies) = (Sheet::new(), Panorama::empty(), world.body_poses());
+    for robot in film::poses(world, POSES, Seed(0))? {
+        let view = View { projection: world.projection_of_size(SIZE_PX.0, SIZE_PX.1), robot, bodies: &bodies };
+        camera.take(&mut renderer, &scene, &view, Twist::default(), Seed(0), &mut panorama)?;
+        sheet.add(&panorama);
+    }
+    Ok(sheet)
+}
+
+/// The home of a world in other light, by other cameras.
+fn presets_sheet(world: &World, scene: &Scene, takes: &[(LightPreset, CameraPreset, Twist)]) -> Result<Sheet> {
+    let (mut sheet, mut panorama, bodies) = (Sheet::new(), Panorama::empty(), world.body_poses());
+    for &(light, camera, twist) in takes {
+        let optics = camera.optics();
+        let lit = scene.under(light, optics.exposure);
+        let view = View { projection: world.projection_of_size(SIZE_PX.0, SIZE_PX.1), robot: world.home, bodies: &bodies };
+        Camera::new(optics).take(&mut CpuRenderer::new(), &lit, &view, twist, Seed(0), &mut panorama)?;
+        sheet.add_colours(&panorama);
+    }
+    Ok(sheet)
+}
+
+/// Writes the page: what was measured, and the [`sheets()`].
 ///
 /// # Errors
 /// When a file cannot be written.
-///
-/// # Panics
-/// When a sheet is none of [`FILES`], which is a fault in this program.
-pub fn write(mut folder: OutputFolder, findings: &Findings, sheets: &[(String, Sheet)]) -> Result<()> {
+pub fn write(mut folder: OutputFolder, found: &RenderSpeeds, sheets: &[(String, Sheet)]) -> Result<()> {
     for (name, sheet) in sheets {
         folder.write(name, &sheet.png(name)?)?;
     }
-    folder.write("speed.json", json(findings).as_bytes())?;
-    folder.write("README.md", page(findings).as_bytes())?;
+    folder.write("speed.json", json(found).as_bytes())?;
+    folder.write("README.md", page(found).as_bytes())?;
     folder.finish()
 }
 
 /// One line a figure, for a terminal.
 #[must_use]
-pub fn text(findings: &Findings) -> String {
+pub fn text(found: &RenderSpeeds) -> String {
     let mut text = header() + "\n";
-    for speed in &findings.speeds {
+    for speed in &found.speeds {
         let _ = writeln!(text, "{}", line(speed));
     }
-    for ((width, height), times) in findings.speedups() {
+    for ((width, height), times) in found.speedups() {
         let _ = writeln!(text, "{width} x {height}: two threads are {times:.2} times as fast as one");
     }
-    for cost in &findings.bodies {
+    for cost in &found.bodies {
         let _ = writeln!(text, "{:5} bodies: {:.0} us a panorama", cost.bodies, 1e6 * cost.panorama_s);
     }
     text
 }
 
 /// Heading of [`line()`].
-#[must_use]
-pub fn header() -> String {
+fn header() -> String {
     format!("{:20} {:>10} {:>7} {:>12} {:>12} {:>15}", "", "size", "threads", "panoramas/s", "colours MB/s", "share of memset")
 }
 
 /// A figure as a line.
 #[must_use]
-pub fn line(speed: &Speed) -> String {
+pub fn line(speed: &Throughput) -> String {
     format!(
         "{:20} {:>10} {:>7} {:>12.0} {:>12.0} {:>13.1} %",
         speed.what,
@@ -81,10 +129,10 @@ pub fn line(speed: &Speed) -> String {
     )
 }
 
-fn page(findings: &Findings) -> String {
+fn page(found: &RenderSpeeds) -> String {
     let mut text = format!(
         "# The renderer\n\n\
-        Made by `wayhome render-report --out results/rendering` with wayhome {}.\n\n\
+        Made by `wayhome verify render --out results/rendering` with wayhome {}.\n\n\
         ## Speed\n\n\
         A round hall of 40 textured walls with 20 discs, floor and ceiling; colours, range and instance of every pixel; prefiltered\n\
         textures, no noise. Four bytes of colour a pixel are counted, six of range and instance come on top. The limit is to fill\n\
@@ -93,33 +141,29 @@ fn page(findings: &Findings) -> String {
         `wayhome render --bench` prints the table of the machine at hand.\n\n",
         crate::VERSION
     );
-    let _ = writeln!(text, "Processor: {}.", findings.processor);
-    if let Some(gpu) = &findings.gpu {
+    let _ = writeln!(text, "Processor: {}.", found.processor);
+    if let Some(gpu) = &found.gpu {
         let _ = writeln!(text, "Graphics adapter: {}, {}.", gpu.adapter, gpu.driver);
     }
-    text += "\n| | size | threads | panoramas a second | colours, MB/s | share of the limit |\n|---|---|---|---|---|---|\n";
-    for s in &findings.speeds {
-        let _ = writeln!(
-            text,
-            "| {} | {} x {} | {} | {:.0} | {:.0} | {:.1} % |",
-            s.what,
-            s.width,
-            s.height,
-            s.threads,
-            s.panoramas_per_s,
-            1e-6 * s.colour_bytes_per_s,
-            100.0 * s.share
-        );
-    }
+    let speeds = found.speeds.iter().map(|s| {
+        [
+            s.what.clone(),
+            format!("{} x {}", s.width, s.height),
+            s.threads.to_string(),
+            format!("{:.0}", s.panoramas_per_s),
+            format!("{:.0}", 1e-6 * s.colour_bytes_per_s),
+            format!("{:.1} %", 100.0 * s.share),
+        ]
+    });
+    text.push('\n');
+    text += &table("| size | threads | panoramas a second | colours, MB/s | share of the limit", speeds);
     text += "\nTwo threads, each with its own pictures, against one: ";
     let times: Vec<String> =
-        findings.speedups().iter().map(|((width, height), times)| format!("{times:.2} times at {width} x {height}")).collect();
-    let (width, height) = findings.bodies_size;
+        found.speedups().iter().map(|((width, height), times)| format!("{times:.2} times at {width} x {height}")).collect();
+    let (width, height) = found.bodies_size;
     let _ = writeln!(text, "{}.\n\nThe cost of bodies at {width} x {height}, one thread:\n", times.join(", "));
-    text += "| bodies | a panorama, \u{b5}s |\n|---|---|\n";
-    for cost in &findings.bodies {
-        let _ = writeln!(text, "| {} | {:.0} |", cost.bodies, 1e6 * cost.panorama_s);
-    }
+    let costs = found.bodies.iter().map(|cost| [cost.bodies.to_string(), format!("{:.0}", 1e6 * cost.panorama_s)]);
+    text += &table("bodies | a panorama, \u{b5}s", costs);
     text += "\n## Light\n\nThe built-in world `gallery` by ";
     text += &names(&LightPreset::ALL);
     text += ".\n\n![Light](light.png)\n\n## Cameras\n\nThe same in motion, 0.2 m/s and 1.5 rad/s, by ";
@@ -133,7 +177,6 @@ fn page(findings: &Findings) -> String {
 }
 
 /// What files call some presets, in a row.
-fn names(presets: &[impl serde::Serialize]) -> String {
-    let name = |preset| serde_json::to_string(preset).unwrap_or_default().replace('"', "`");
-    presets.iter().map(name).collect::<Vec<_>>().join(", ")
+fn names<T: Copy + Into<&'static str>>(presets: &[T]) -> String {
+    presets.iter().map(|&preset| format!("`{}`", preset.into())).collect::<Vec<_>>().join(", ")
 }

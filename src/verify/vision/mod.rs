@@ -3,8 +3,8 @@
 //! Panoramas are taken around home, and the renderer's range says where each home feature must appear in them. One condition at
 //! a time is changed: distance, turn, light, noise, camera, what stands in between. The truth scores; the extractor sees colours only.
 
-pub mod conditions;
-pub mod outside;
+pub mod condition;
+mod opencv;
 pub mod page;
 pub mod score;
 
@@ -22,16 +22,17 @@ use crate::panorama::{Panorama, Shot};
 use crate::physics::{Plant, RapierPlant};
 use crate::random::Seed;
 use crate::render::{Camera, CpuRenderer, Scene, View};
+use crate::verify::speed::pool_of;
 use crate::vision::{Extractor, ExtractorSettings, Landmarks};
-use crate::world::World;
-use conditions::{Axis, Condition};
+use crate::world::{CameraPreset, World};
+use condition::{Condition, Factor};
 use score::{Score, Spread};
 
 /// Directions from home in which panoramas are taken, where the robot can stand there.
 const DIRECTIONS: usize = 16;
-/// Distance from home for all axes but that of distance, m.
+/// Distance from home for all factors but distance, m.
 const USUAL_DISTANCE_M: f64 = 1.0;
-/// Time that those who walk are given between two panoramas, s.
+/// Time for which bodies walk on between two panoramas, s.
 const PAUSE_S: f64 = 2.0;
 
 /// A panorama that is going to be scored, beside that of home.
@@ -47,13 +48,14 @@ pub struct Pair<'a> {
     pub shot: &'a Shot,
 }
 
-/// One level of one axis in one world.
+/// What was measured at one level of one factor in one world.
 #[derive(Debug, Clone, Serialize)]
-pub struct Cell {
+pub struct LevelScore {
     /// Name of the world.
     pub world: String,
     /// What is changed.
-    pub axis: Axis,
+    #[serde(rename = "axis")]
+    pub factor: Factor,
     /// How far.
     pub level: f64,
     /// What the level is called.
@@ -92,11 +94,12 @@ pub struct Cell {
     pub object_error_sd: Option<Spread>,
 }
 
-/// All cells.
+/// All that was measured.
 #[derive(Debug, Clone, Serialize)]
 pub struct VisionStudy {
-    /// By world, axis and level.
-    pub cells: Vec<Cell>,
+    /// By world, factor and level.
+    #[serde(rename = "cells")]
+    pub levels: Vec<LevelScore>,
     /// Bearing errors of all right matches by distance from home, ascending, rad: (distance in metres, errors).
     #[serde(skip)]
     pub errors_rad: Vec<(f64, Vec<f64>)>,
@@ -119,32 +122,34 @@ pub struct VisionStudy {
 pub struct VisionSettings {
     /// The extractor.
     pub extractor: ExtractorSettings,
-    /// Axes, in this order.
-    pub axes: Vec<Axis>,
+    /// What is changed, in this order.
+    pub factors: Vec<Factor>,
     /// Seed of walkers, noise and what hides.
     pub seed: u64,
 }
 
-/// Number of cells that `settings` ask for in each world.
-#[must_use]
-pub fn cells(settings: &VisionSettings) -> usize {
-    settings.axes.iter().map(|axis| axis.levels().len()).sum()
+impl VisionSettings {
+    /// Number of levels that are measured in each world.
+    #[must_use]
+    pub fn levels(&self) -> usize {
+        self.factors.iter().map(|factor| factor.levels().len()).sum()
+    }
 }
 
-/// Runs the study. `take` gets every panorama of the distance axis and the home panoramas as they are rendered; `watch` is called
-/// when a cell is done. The result, but for its time, does not depend on the number of threads.
+/// Measures. `take` gets every panorama of the factor distance and the home panoramas as they are rendered; `watch` is called when
+/// a level is done. The result, but for its time, does not depend on the number of threads.
 ///
 /// # Errors
 /// When a world cannot be packed or rendered, `take` fails, or `watch` breaks.
-pub fn run(
+pub fn measure(
     worlds: &[World],
     settings: &VisionSettings,
     take: &mut dyn FnMut(&Pair<'_>) -> Result<()>,
-    watch: &dyn Fn(&Cell) -> ControlFlow<()>,
+    watch: &dyn Fn(&LevelScore) -> ControlFlow<()>,
 ) -> Result<VisionStudy> {
     let mut study = VisionStudy {
-        cells: Vec::new(),
-        errors_rad: Axis::Distance.levels().iter().map(|d| (*d, Vec::new())).collect(),
+        levels: Vec::new(),
+        errors_rad: Factor::Distance.levels().iter().map(|d| (*d, Vec::new())).collect(),
         worlds: worlds.iter().map(|w| (w.spec.name.clone(), w.sha256.clone())).collect(),
         keypoints: settings.extractor.features,
         size_px: worlds.first().map_or([0, 0], |w| [w.projection().width, w.projection().height]),
@@ -154,24 +159,22 @@ pub fn run(
     };
     let mut times_ms = Vec::new();
     for world in worlds {
-        let studio = Studio::new(world, settings)?;
-        take(&Pair { world, place: None, distance_m: 0.0, shot: &studio.home })?;
-        for &axis in &settings.axes {
-            for (k, &level) in axis.levels().iter().enumerate() {
-                let shots = studio.take(axis, level)?;
-                if axis == Axis::Distance {
+        let site = Site::new(world, settings)?;
+        take(&Pair { world, place: None, distance_m: 0.0, shot: &site.home })?;
+        for &factor in &settings.factors {
+            for (k, &level) in factor.levels().iter().enumerate() {
+                let shots = site.take(factor, level)?;
+                if factor == Factor::Distance {
                     for (place, shot) in &shots {
                         take(&Pair { world, place: Some(*place), distance_m: level, shot })?;
                     }
                 }
-                let score = studio.score(axis, level, shots, &mut times_ms)?;
-                if axis == Axis::Distance {
+                let score = site.score(factor, level, shots, &mut times_ms)?;
+                if factor == Factor::Distance {
                     study.errors_rad[k].1.extend_from_slice(&score.errors_rad);
                 }
-                let cell = cell(world, axis, level, &score);
-                let broken = watch(&cell).is_break();
-                study.cells.push(cell);
-                if broken {
+                study.levels.push(level_score(world, factor, level, &score));
+                if study.levels.last().is_some_and(|last| watch(last).is_break()) {
                     return Err(Error::Interrupted);
                 }
             }
@@ -181,14 +184,14 @@ pub fn run(
     Ok(study)
 }
 
-fn cell(world: &World, axis: Axis, level: f64, score: &Score) -> Cell {
+fn level_score(world: &World, factor: Factor, level: f64, score: &Score) -> LevelScore {
     let per_panorama = |count: usize| count as f64 / score.panoramas.max(1) as f64;
     let degrees = |errors: &[f64]| Spread::of(errors).map(|s| s.times(1f64.to_degrees()));
-    Cell {
+    LevelScore {
         world: world.spec.name.clone(),
-        axis,
+        factor,
         level,
-        label: axis.label(level),
+        label: factor.label(level),
         panoramas: score.panoramas,
         repeatability: score.repeatability(),
         matches: per_panorama(score.matches),
@@ -208,22 +211,22 @@ fn cell(world: &World, axis: Axis, level: f64, score: &Score) -> Cell {
     }
 }
 
-/// A world that panoramas are taken of.
-struct Studio<'a> {
+/// A world with its home panorama.
+struct Site<'a> {
     world: &'a World,
     settings: &'a VisionSettings,
     scene: Scene,
     home: Shot,
 }
 
-/// The two extractors that look at a panorama: that of features, that of objects with its home snapshot.
-struct Eyes {
+/// The extractors of features and of objects, and what the latter knows of home.
+struct Extractors {
     features: Extractor,
     objects: Extractor,
     snapshot: HomeSnapshot,
 }
 
-impl Eyes {
+impl Extractors {
     fn new(settings: &ExtractorSettings, home: &Panorama) -> Self {
         let with = |landmarks| Extractor::new(ExtractorSettings { landmarks, ..settings.clone() }, home);
         let objects = with(Landmarks::Objects);
@@ -231,19 +234,19 @@ impl Eyes {
     }
 }
 
-impl<'a> Studio<'a> {
+impl<'a> Site<'a> {
     fn new(world: &'a World, settings: &'a VisionSettings) -> Result<Self> {
         let scene = Scene::new(world)?;
-        let clear = Sight { scene: &scene, world, condition: Condition::CLEAR };
-        let home = clear.shoot(world.home, &world.body_poses(), Seed(settings.seed).derive("vision/home"))?;
+        let seed = Seed(settings.seed).derive("vision/home");
+        let home = shoot(world, &scene, CameraPreset::Ideal, world.home, &world.body_poses(), seed)?;
         Ok(Self { world, settings, scene, home })
     }
 
     /// Panoramas around home, with the numbers of their places: as far off and turned as the level says, else 1 m off and turned
-    /// somehow. Those who walk do.
-    fn take(&self, axis: Axis, level: f64) -> Result<Vec<(usize, Shot)>> {
+    /// somehow. Bodies that walk go on meanwhile.
+    fn take(&self, factor: Factor, level: f64) -> Result<Vec<(usize, Shot)>> {
         let (world, home) = (self.world, self.world.home);
-        let distance_m = if axis == Axis::Distance { level } else { USUAL_DISTANCE_M };
+        let distance_m = if factor == Factor::Distance { level } else { USUAL_DISTANCE_M };
         // Walkers meet a robot that waits at home.
         let mut plant = RapierPlant::new(world, home, Seed(self.settings.seed));
         let moving = world.bodies.iter().any(|b| b.motion.is_some());
@@ -258,57 +261,56 @@ impl<'a> Studio<'a> {
             let azimuth = TAU * (k as f64 + 0.5) / DIRECTIONS as f64;
             let point = home.position() + direction(home.heading + azimuth) * distance_m;
             // The golden angle: turns that neither repeat nor follow the direction.
-            let turn = if axis == Axis::Rotation { level.to_radians() } else { 2.399_963 * k as f64 + 1.0 };
+            let turn = if factor == Factor::Rotation { level.to_radians() } else { 2.399_963 * k as f64 + 1.0 };
             let pose = Pose::new(point.x, point.y, home.heading + turn);
             let bodies = plant.body_poses();
             if world.is_free(&pose, 0.0, bodies).is_ok() {
                 views.push((k, pose, bodies.to_vec()));
             }
         }
-        let condition = Condition::at(axis, level);
+        let condition = Condition::at(factor, level);
         let scene = self.scene.under(condition.light, condition.camera.optics().exposure);
-        let sight = Sight { scene: &scene, world, condition };
-        let noise = Seed(self.settings.seed).derive(&format!("vision/{}/{level}", axis.name()));
-        let shots =
-            views.into_par_iter().map(|(k, pose, bodies)| Ok((k, sight.shoot(pose, &bodies, noise.derive(&k.to_string()))?)));
-        shots.collect()
+        let noise = Seed(self.settings.seed).derive(&format!("vision/{}/{level}", factor.name()));
+        let take = |(k, pose, bodies): (usize, Pose, Vec<Pose>)| {
+            Ok((k, shoot(world, &scene, condition.camera, pose, &bodies, noise.derive(&k.to_string()))?))
+        };
+        views.into_par_iter().map(take).collect()
     }
 
-    fn score(&self, axis: Axis, level: f64, shots: Vec<(usize, Shot)>, times_ms: &mut Vec<f64>) -> Result<Score> {
-        let condition = Condition::at(axis, level);
+    fn score(&self, factor: Factor, level: f64, shots: Vec<(usize, Shot)>, times_ms: &mut Vec<f64>) -> Result<Score> {
+        let condition = Condition::at(factor, level);
         let seed = Seed(self.settings.seed);
-        let stream = |place: &str| seed.stream(&format!("vision/{}/{level}/{place}", axis.name()));
+        let stream = |place: &str| seed.stream(&format!("vision/{}/{level}/{place}", factor.name()));
         let mut home = self.home.panorama.clone();
-        if axis == Axis::Noise {
+        if factor == Factor::Noise {
             condition.apply(&mut home, &mut stream("home"));
         }
         let look = |mut shots: Vec<(usize, Shot)>| -> Vec<(Score, f64)> {
-            let mut eyes = Eyes::new(&self.settings.extractor, &home);
+            let mut extractors = Extractors::new(&self.settings.extractor, &home);
             let score = |(place, shot): &mut (usize, Shot)| {
                 condition.apply(&mut shot.panorama, &mut stream(&place.to_string()));
                 let mut score = Score::default();
-                score.add_objects(&mut eyes.objects, &eyes.snapshot, &self.home, shot);
+                score.add_objects(&mut extractors.objects, &extractors.snapshot, &self.home, shot);
                 let start = Instant::now();
-                eyes.features.observe(&shot.panorama);
+                extractors.features.observe(&shot.panorama);
                 let time_ms = 1e3 * start.elapsed().as_secs_f64();
-                score.add(&eyes.features, &self.home, shot);
+                score.add(&extractors.features, &self.home, shot);
                 (score, time_ms)
             };
             shots.iter_mut().map(score).collect()
         };
         // A pool of one for each part, so that a panorama is timed on one thread, which does nothing else meanwhile.
         let size = shots.len().div_ceil(rayon::current_num_threads()).max(1);
-        let mut shots = shots.into_iter();
-        let parts = std::iter::from_fn(|| Some(shots.by_ref().take(size).collect::<Vec<_>>()).filter(|part| !part.is_empty()));
-        let parts: Vec<_> = parts.collect();
+        let mut parts: Vec<Vec<_>> = Vec::new();
+        for shot in shots {
+            match parts.last_mut() {
+                Some(part) if part.len() < size => part.push(shot),
+                _ => parts.push(vec![shot]),
+            }
+        }
         let scores = std::thread::scope(|scope| {
-            let worker = |part| {
-                let look = &look;
-                scope.spawn(move || {
-                    let alone = rayon::ThreadPoolBuilder::new().num_threads(1).build();
-                    alone.map_err(|e| Error::Threads(e.to_string())).map(|pool| pool.install(|| look(part)))
-                })
-            };
+            let look = &look;
+            let worker = |part| scope.spawn(move || pool_of(1).map(|pool| pool.install(|| look(part))));
             let workers: Vec<_> = parts.into_iter().map(worker).collect();
             let scores = workers.into_iter().map(|w| w.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)));
             scores.collect::<Result<Vec<_>>>()
@@ -322,21 +324,11 @@ impl<'a> Studio<'a> {
     }
 }
 
-/// A room, its light, and a camera.
-struct Sight<'a> {
-    scene: &'a Scene,
-    world: &'a World,
-    condition: Condition,
-}
-
-impl Sight<'_> {
-    /// Takes a panorama from where the robot stands still.
-    fn shoot(&self, robot: Pose, bodies: &[Pose], noise: Seed) -> Result<Shot> {
-        let projection = self.world.projection();
-        let mut panorama = Panorama::black(projection);
-        let view = View { projection, robot, bodies };
-        let mut camera = Camera::new(self.condition.camera.optics());
-        camera.take(&mut CpuRenderer::new(), self.scene, &view, Twist::default(), noise, &mut panorama)?;
-        Ok(Shot { panorama, pose: self.world.camera_pose(&robot) })
-    }
+/// Takes a panorama from where the robot stands still.
+fn shoot(world: &World, scene: &Scene, camera: CameraPreset, robot: Pose, bodies: &[Pose], noise: Seed) -> Result<Shot> {
+    let projection = world.projection();
+    let mut panorama = Panorama::black(projection);
+    let view = View { projection, robot, bodies };
+    Camera::new(camera.optics()).take(&mut CpuRenderer::new(), scene, &view, Twist::default(), noise, &mut panorama)?;
+    Ok(Shot { panorama, pose: world.camera_pose(&robot) })
 }

@@ -2,15 +2,18 @@
 
 use std::fmt::Write;
 
-use super::outside::{FILE as OUTSIDE, Outside};
-use crate::draw::chart::{Axis as ChartAxis, Chart, Mark, Stroke};
+use strum::VariantArray;
+
+use super::condition::Factor;
+use super::opencv::{self, Detections};
+use super::score::{RIGHT_PX, Spread};
+use super::{LevelScore, VisionStudy};
+use crate::draw::chart::{Axis, Chart, Mark, Stroke};
+use crate::draw::markdown::table;
 use crate::error::Result;
 use crate::storage::OutputFolder;
-use crate::verify::vision::conditions::Axis;
-use crate::verify::vision::score::{RIGHT_PX, Spread};
-use crate::verify::vision::{Cell, VisionStudy};
 
-/// Names of all files of the page. [`OUTSIDE`] comes from outside and is kept as it is.
+/// Names of all files of the page. The table of OpenCV comes from outside and is kept as it is.
 pub const FILES: &[&str] = &[
     "README.md",
     "vision.csv",
@@ -23,140 +26,202 @@ pub const FILES: &[&str] = &[
     "conditions-gamma.svg",
     "conditions-noise.svg",
     "conditions-occlusion.svg",
-    OUTSIDE,
+    opencv::FILE,
     "opencv.svg",
 ];
 
-/// Writes the page that `command` has made. `outside` is the text of [`OUTSIDE`] where the folder has one.
+/// Writes the page that `command` has made. What OpenCV makes of the same pairs is shown if its table lies in the folder.
 ///
 /// # Errors
 /// When a file cannot be written, or the table from outside is not what its script writes.
-pub fn write(mut folder: OutputFolder, study: &VisionStudy, command: &str, outside: Option<&str>) -> Result<()> {
-    let table = outside.map(Outside::parse).transpose()?;
+pub fn write(mut folder: OutputFolder, study: &VisionStudy, command: &str) -> Result<()> {
+    let detections = Detections::keep(&mut folder)?;
     folder.write("vision.csv", csv(study).as_bytes())?;
-    for (name, _, chart) in charts(study) {
-        folder.write(name, chart.to_svg().as_bytes())?;
+    let figures = figures(study);
+    for figure in &figures {
+        folder.write(&figure.file, figure.chart.to_svg().as_bytes())?;
     }
-    if let (Some(table), Some(text)) = (&table, outside) {
-        folder.write(OUTSIDE, text.as_bytes())?;
-        folder.write("opencv.svg", table.chart().to_svg().as_bytes())?;
+    if let Some(detections) = &detections {
+        folder.write("opencv.svg", detections.chart().to_svg().as_bytes())?;
     }
-    folder.write("README.md", page(study, command, table.as_ref()).as_bytes())?;
+    folder.write("README.md", page(study, command, &figures, detections.as_ref()).as_bytes())?;
     folder.finish()
 }
 
-/// Columns of `vision.csv`.
-const COLUMNS: &str = "world,axis,level,panoramas,repeatability,matches,right,least_right,precision,wrong,wrong_same_instance,\
-     wrong_near,wrong_wild,error_median_deg,error_q95_deg,error_median_px,error_q95_px,error_q68_sd,error_q95_sd,objects,\
-     object_error_median_deg,object_error_q95_deg,object_error_q68_sd,object_error_q95_sd";
-
-/// One row a cell, empty cells where there is no number.
-#[must_use]
-pub fn csv(study: &VisionStudy) -> String {
-    let mut text = format!("{COLUMNS}\n");
+/// One row a level, empty cells where there is no number.
+fn csv(study: &VisionStudy) -> String {
     let number = |value: Option<f64>| value.map_or_else(String::new, |v| v.to_string());
-    for c in &study.cells {
-        let _ = write!(text, "{},{},{},{},", c.world, c.axis.name(), c.label, c.panoramas);
-        let _ = write!(text, "{},{},{},{},{},", c.repeatability, c.matches, c.right, c.least_right, c.precision);
-        let _ = write!(text, "{},{},{},{}", c.wrong, c.wrong_same_instance, c.wrong_near, c.wrong_wild);
-        let spreads = [
-            c.error_deg.map(|s| s.median),
-            c.error_deg.map(|s| s.q95),
-            c.error_px.map(|s| s.median),
-            c.error_px.map(|s| s.q95),
-            c.error_sd.map(|s| s.q68),
-            c.error_sd.map(|s| s.q95),
-            Some(c.objects),
-            c.object_error_deg.map(|s| s.median),
-            c.object_error_deg.map(|s| s.q95),
-            c.object_error_sd.map(|s| s.q68),
-            c.object_error_sd.map(|s| s.q95),
-        ];
-        for value in spreads {
-            let _ = write!(text, ",{}", number(value));
+    let row = |c: &LevelScore| {
+        let (degrees, px, sd) = (c.error_deg, c.error_px, c.error_sd);
+        [
+            ("world", c.world.clone()),
+            ("axis", c.factor.name().to_owned()),
+            ("level", c.label.clone()),
+            ("panoramas", c.panoramas.to_string()),
+            ("repeatability", c.repeatability.to_string()),
+            ("matches", c.matches.to_string()),
+            ("right", c.right.to_string()),
+            ("least_right", c.least_right.to_string()),
+            ("precision", c.precision.to_string()),
+            ("wrong", c.wrong.to_string()),
+            ("wrong_same_instance", c.wrong_same_instance.to_string()),
+            ("wrong_near", c.wrong_near.to_string()),
+            ("wrong_wild", c.wrong_wild.to_string()),
+            ("error_median_deg", number(degrees.map(|s| s.median))),
+            ("error_q95_deg", number(degrees.map(|s| s.q95))),
+            ("error_median_px", number(px.map(|s| s.median))),
+            ("error_q95_px", number(px.map(|s| s.q95))),
+            ("error_q68_sd", number(sd.map(|s| s.q68))),
+            ("error_q95_sd", number(sd.map(|s| s.q95))),
+            ("objects", c.objects.to_string()),
+            ("object_error_median_deg", number(c.object_error_deg.map(|s| s.median))),
+            ("object_error_q95_deg", number(c.object_error_deg.map(|s| s.q95))),
+            ("object_error_q68_sd", number(c.object_error_sd.map(|s| s.q68))),
+            ("object_error_q95_sd", number(c.object_error_sd.map(|s| s.q95))),
+        ]
+    };
+    let mut text = String::new();
+    for (k, cells) in study.levels.iter().map(row).enumerate() {
+        if k == 0 {
+            text += &(cells.each_ref().map(|(name, _)| *name).join(",") + "\n");
         }
-        text.push('\n');
+        text += &(cells.map(|(_, value)| value).join(",") + "\n");
     }
     text
 }
 
-fn of<'a>(study: &'a VisionStudy, world: &'a str, axis: Axis) -> impl Iterator<Item = &'a Cell> {
-    study.cells.iter().filter(move |c| c.world == world && c.axis == axis)
+fn of<'a>(study: &'a VisionStudy, world: &'a str, factor: Factor) -> impl Iterator<Item = &'a LevelScore> {
+    study.levels.iter().filter(move |c| c.world == world && c.factor == factor)
 }
 
-/// What an axis shows, with its unit.
-fn title(axis: Axis) -> &'static str {
-    match axis {
-        Axis::Distance => "distance from home (m)",
-        Axis::Rotation => "turn since home (degrees)",
-        Axis::Gain => "factor on the grey levels",
-        Axis::Gamma => "exponent on the grey levels",
-        Axis::Noise => "noise (sd, grey levels)",
-        Axis::Occlusion => "share of the turn that is hidden (%)",
-        Axis::Light => "light",
-        Axis::Camera => "camera",
-    }
+/// How the page tells of a factor.
+struct About {
+    heading: &'static str,
+    /// Axis of charts, with its unit.
+    axis: Axis,
+    /// What exactly is done.
+    explanation: &'static str,
+    /// What is said above the chart of its levels, which has a name on file; `None` where charts are others or there is none.
+    chart: Option<&'static str>,
 }
 
-/// A level in the unit of the title.
-fn shown(axis: Axis, level: f64) -> f64 {
-    if axis == Axis::Occlusion { 100.0 * level } else { level }
+fn about(factor: Factor) -> About {
+    let (heading, axis, chart, explanation) = match factor {
+        Factor::Distance => (
+            "Distance from home",
+            Axis::linear("distance from home (m)"),
+            None,
+            "People who walk have walked on for 2 s between one panorama and the next.",
+        ),
+        Factor::Rotation => (
+            "Rotation",
+            Axis::linear("turn since home (degrees)"),
+            Some("Turned"),
+            "1 m from home, turned by this much since home, in degrees.",
+        ),
+        Factor::Gain => (
+            "Brightness",
+            Axis::log("factor on the grey levels"),
+            Some("In brighter and darker light"),
+            "1 m from home; all grey levels times this factor, clipped at white. The home panorama is as it was.",
+        ),
+        Factor::Gamma => (
+            "Contrast",
+            Axis::log("exponent on the grey levels"),
+            Some("With another contrast"),
+            "1 m from home; grey levels of 0 to 1 to this power. The home panorama is as it was.",
+        ),
+        Factor::Light => (
+            "Light",
+            Axis::linear("light"),
+            None,
+            "1 m from home, which was seen by day: the light presets of the worlds. Where a room has no windows, `glare` is `day`.",
+        ),
+        Factor::Noise => (
+            "Image noise",
+            Axis::linear("noise (sd, grey levels)"),
+            Some("With image noise"),
+            "1 m from home; normal noise of this standard deviation, in grey levels of 255, on each channel of each pixel, in the \
+             home panorama too.",
+        ),
+        Factor::Camera => (
+            "Camera",
+            Axis::linear("camera"),
+            None,
+            "1 m from home, which was seen through the ideal camera: the camera presets, the robot at rest.",
+        ),
+        Factor::Occlusion => (
+            "Occlusion",
+            Axis::linear("share of the turn that is hidden (%)"),
+            Some("Behind what was not there"),
+            "1 m from home; upright things with a patchy dress, 9 to 26 degrees wide and as high as the picture, hide this share of \
+             the turn.",
+        ),
+    };
+    About { heading, axis, explanation, chart }
+}
+
+/// A level in the unit of the axis.
+fn shown(factor: Factor, level: f64) -> f64 {
+    if factor == Factor::Occlusion { 100.0 * level } else { level }
 }
 
 /// A level as a table shows it.
-fn name(cell: &Cell) -> String {
-    if cell.axis == Axis::Occlusion { shown(cell.axis, cell.level).to_string() } else { cell.label.clone() }
+fn name(c: &LevelScore) -> String {
+    if c.factor == Factor::Occlusion { shown(c.factor, c.level).to_string() } else { c.label.clone() }
 }
 
 /// A chart of one line a world.
-fn chart(study: &VisionStudy, axis: Axis, name: &str, y: &str, value: impl Fn(&Cell) -> f64) -> Chart {
-    let x = if matches!(axis, Axis::Gain | Axis::Gamma) { ChartAxis::log(title(axis)) } else { ChartAxis::linear(title(axis)) };
-    let mut chart = Chart::new(name, x, ChartAxis::linear(y).from(0.0));
+fn chart(study: &VisionStudy, factor: Factor, title: &str, y: &str, value: impl Fn(&LevelScore) -> f64) -> Chart {
+    let mut chart = Chart::new(title, about(factor).axis, Axis::linear(y).from(0.0));
     for (k, (world, _)) in study.worlds.iter().enumerate() {
-        let points: Vec<[f64; 2]> = of(study, world, axis).map(|c| [shown(axis, c.level), value(c)]).collect();
+        let points: Vec<[f64; 2]> = of(study, world, factor).map(|c| [shown(factor, c.level), value(c)]).collect();
         chart = chart.line(points.iter().copied(), &Stroke::series(k), world).points(points, &Mark::series(k), "");
     }
     chart
 }
 
-/// File name, caption and drawing.
-type Figure = (&'static str, &'static str, Chart);
+/// A chart of the page.
+struct Figure {
+    file: String,
+    caption: &'static str,
+    chart: Chart,
+}
 
-/// The charts of those axes that were measured.
-fn charts(study: &VisionStudy) -> Vec<Figure> {
-    let measured = |axis: Axis| study.cells.iter().any(|c| c.axis == axis);
+/// The charts of those factors that were measured.
+fn figures(study: &VisionStudy) -> Vec<Figure> {
     let mut figures: Vec<Figure> = Vec::new();
-    if measured(Axis::Distance) {
-        let matches = chart(study, Axis::Distance, "Home features found again", "right matches a panorama", |c| c.right);
-        figures.push(("matches.svg", "Right matches over distance", matches));
-        let precision = chart(study, Axis::Distance, "Matching precision", "right of all matches (%)", |c| 100.0 * c.precision)
-            .line([[1.9, 90.0], [2.1, 90.0]], &Stroke::EXACT, "asked for at 2 m and 3 m")
-            .line([[2.9, 80.0], [3.1, 80.0]], &Stroke::EXACT, "");
-        figures.push(("precision.svg", "Precision over distance", precision));
-        let repeat =
-            chart(study, Axis::Distance, "Repeatability", "visible home features found (%)", |c| 100.0 * c.repeatability);
-        figures.push(("repeatability.svg", "Repeatability over distance", repeat));
-        figures.push(("errors.svg", "Bearing errors", errors(study)));
-    }
-    for (axis, file, name) in [
-        (Axis::Rotation, "conditions-rotation.svg", "Turned"),
-        (Axis::Gain, "conditions-gain.svg", "In brighter and darker light"),
-        (Axis::Gamma, "conditions-gamma.svg", "With another contrast"),
-        (Axis::Noise, "conditions-noise.svg", "With image noise"),
-        (Axis::Occlusion, "conditions-occlusion.svg", "Behind what was not there"),
-    ] {
-        if measured(axis) {
-            let drawing = chart(study, axis, &format!("{name}, 1 m from home"), "right matches a panorama", |c| c.right);
-            figures.push((file, name, drawing));
+    let mut add = |file: &str, caption, chart| figures.push(Figure { file: format!("{file}.svg"), caption, chart });
+    for factor in measured(study) {
+        if let Some(caption) = about(factor).chart {
+            let title = format!("{caption}, 1 m from home");
+            let drawing = chart(study, factor, &title, "right matches a panorama", |c| c.right);
+            add(&format!("conditions-{}", factor.name()), caption, drawing);
+        }
+        if factor == Factor::Distance {
+            let chart = |title: &str, y: &str, value: fn(&LevelScore) -> f64| chart(study, factor, title, y, value);
+            let matches = chart("Home features found again", "right matches a panorama", |c| c.right);
+            add("matches", "Right matches over distance", matches);
+            let precision = chart("Matching precision", "right of all matches (%)", |c| 100.0 * c.precision)
+                .line([[1.9, 90.0], [2.1, 90.0]], &Stroke::EXACT, "asked for at 2 m and 3 m")
+                .line([[2.9, 80.0], [3.1, 80.0]], &Stroke::EXACT, "");
+            add("precision", "Precision over distance", precision);
+            let repeatability = chart("Repeatability", "visible home features found (%)", |c| 100.0 * c.repeatability);
+            add("repeatability", "Repeatability over distance", repeatability);
+            add("errors", "Bearing errors", errors(study));
         }
     }
     figures
 }
 
+fn measured(study: &VisionStudy) -> impl Iterator<Item = Factor> {
+    Factor::VARIANTS.iter().copied().filter(|factor| study.levels.iter().any(|c| c.factor == *factor))
+}
+
 /// Share of the bearing errors below each size, a curve a distance; all worlds together.
 fn errors(study: &VisionStudy) -> Chart {
-    let x = ChartAxis::log("bearing error (degrees)");
-    let mut chart = Chart::new("Bearing errors of right matches", x, ChartAxis::linear("smaller (%)").from(0.0));
+    let x = Axis::log("bearing error (degrees)");
+    let mut chart = Chart::new("Bearing errors of right matches", x, Axis::linear("smaller (%)").from(0.0));
     for (k, (distance_m, errors)) in study.errors_rad.iter().enumerate() {
         let mut sorted: Vec<f64> = errors.iter().map(|e| e.to_degrees()).collect();
         sorted.sort_by(f64::total_cmp);
@@ -170,18 +235,18 @@ fn errors(study: &VisionStudy) -> Chart {
 
 /// The study for a terminal.
 #[must_use]
-pub fn table(study: &VisionStudy) -> String {
+pub fn text(study: &VisionStudy) -> String {
     let mut text = format!(
         "{:10} {:9} {:>8} {:>5} {:>7} {:>7} {:>7} {:>7} {:>8} {:>8} {:>7} {:>7}\n",
         "world", "axis", "level", "shots", "repeat%", "matches", "right", "prec%", "med deg", "95% deg", "68% sd", "95% sd"
     );
-    for c in &study.cells {
+    for c in &study.levels {
         let number = |value: Option<f64>, decimals: usize| value.map_or_else(|| "-".to_owned(), |v| format!("{v:.decimals$}"));
         let _ = writeln!(
             text,
             "{:10} {:9} {:>8} {:>5} {:>7.1} {:>7.1} {:>7.1} {:>7.1} {:>8} {:>8} {:>7} {:>7}",
             c.world,
-            c.axis.name(),
+            c.factor.name(),
             name(c),
             c.panoramas,
             100.0 * c.repeatability,
@@ -199,7 +264,7 @@ pub fn table(study: &VisionStudy) -> String {
 }
 
 /// The study as Markdown.
-fn page(study: &VisionStudy, command: &str, outside: Option<&Outside>) -> String {
+fn page(study: &VisionStudy, command: &str, figures: &[Figure], detections: Option<&Detections>) -> String {
     let worlds: Vec<String> = study.worlds.iter().map(|(name, sha)| format!("`{name}` (SHA-256 `{}`)", &sha[..12])).collect();
     let [width, height] = study.size_px;
     let mut text = format!(
@@ -215,129 +280,88 @@ fn page(study: &VisionStudy, command: &str, outside: Option<&Outside>) -> String
         worlds = worlds.join(", "),
         keypoints = study.keypoints,
     );
-    for (file, caption, _) in charts(study) {
+    for Figure { file, caption, .. } in figures {
         let _ = writeln!(text, "![{caption}]({file})\n");
     }
-    for axis in Axis::ALL.into_iter().filter(|axis| study.cells.iter().any(|c| c.axis == *axis)) {
-        let _ = writeln!(text, "## {}\n\n{}\n", heading(axis), explanation(axis));
-        text.push_str(&axis_table(study, axis));
+    for factor in measured(study) {
+        let About { heading, explanation, .. } = about(factor);
+        let _ = writeln!(text, "## {heading}\n\n{explanation}\n\n{}", factor_table(study, factor));
     }
-    text.push_str(&wrong_matches(study));
-    text.push_str(&objects(study));
-    if let Some(outside) = outside {
-        text.push_str(&outside.section(study));
+    text += &wrong_matches(study);
+    text += &objects(study);
+    if let Some(detections) = detections {
+        text += &detections.section(study);
     }
     text
 }
 
-fn heading(axis: Axis) -> &'static str {
-    match axis {
-        Axis::Distance => "Distance from home",
-        Axis::Rotation => "Rotation",
-        Axis::Gain => "Brightness",
-        Axis::Gamma => "Contrast",
-        Axis::Noise => "Image noise",
-        Axis::Occlusion => "Occlusion",
-        Axis::Light => "Light",
-        Axis::Camera => "Camera",
-    }
+/// Two quantiles of a spread.
+fn two(spread: Option<Spread>, pick: fn(Spread) -> [f64; 2], decimals: usize) -> String {
+    let pair = spread.map(pick).map(|[a, b]| format!("{a:.decimals$}, {b:.decimals$}"));
+    pair.unwrap_or_else(|| "-".to_owned())
 }
 
-/// What exactly is done.
-fn explanation(axis: Axis) -> &'static str {
-    match axis {
-        Axis::Distance => "People who walk have walked on for 2 s between one panorama and the next.",
-        Axis::Rotation => "1 m from home, turned by this much since home, in degrees.",
-        Axis::Gain => "1 m from home; all grey levels times this factor, clipped at white. The home panorama is as it was.",
-        Axis::Gamma => "1 m from home; grey levels of 0 to 1 to this power. The home panorama is as it was.",
-        Axis::Light => {
-            "1 m from home, which was seen by day: the light presets of the worlds. Where a room has no windows, `glare` is `day`."
-        }
-        Axis::Camera => "1 m from home, which was seen through the ideal camera: the camera presets, the robot at rest.",
-        Axis::Noise => {
-            "1 m from home; normal noise of this standard deviation, in grey levels of 255, on each channel of each pixel, in the \
-             home panorama too."
-        }
-        Axis::Occlusion => {
-            "1 m from home; upright things with a patchy dress, 9 to 26 degrees wide and as high as the picture, hide this share of \
-             the turn."
-        }
-    }
-}
-
-fn axis_table(study: &VisionStudy, axis: Axis) -> String {
-    let mut text =
-        "| world | level | panoramas | repeatability % | matches | right (least) | precision % | error median, 95 % (degrees) \
-                    | (pixels) | 68 %, 95 % (stated sd) |\n|---|---|---|---|---|---|---|---|---|---|\n"
-            .to_owned();
-    let two = |spread: Option<Spread>, pick: fn(Spread) -> [f64; 2], decimals: usize| {
-        spread.map_or_else(
-            || "-".to_owned(),
-            |s| {
-                let [a, b] = pick(s);
-                format!("{a:.decimals$}, {b:.decimals$}")
-            },
-        )
-    };
-    for c in study.cells.iter().filter(|c| c.axis == axis) {
-        let _ = writeln!(
-            text,
-            "| {} | {} | {} | {:.1} | {:.1} | {:.1} ({}) | {:.1} | {} | {} | {} |",
-            c.world,
+fn factor_table(study: &VisionStudy, factor: Factor) -> String {
+    let columns = "world | level | panoramas | repeatability % | matches | right (least) | precision % | error median, 95 % (degrees) | (pixels) | 68 %, 95 % (stated sd)";
+    let row = |c: &LevelScore| {
+        [
+            c.world.clone(),
             name(c),
-            c.panoramas,
-            100.0 * c.repeatability,
-            c.matches,
-            c.right,
-            c.least_right,
-            100.0 * c.precision,
+            c.panoramas.to_string(),
+            format!("{:.1}", 100.0 * c.repeatability),
+            format!("{:.1}", c.matches),
+            format!("{:.1} ({})", c.right, c.least_right),
+            format!("{:.1}", 100.0 * c.precision),
             two(c.error_deg, |s| [s.median, s.q95], 3),
             two(c.error_px, |s| [s.median, s.q95], 2),
             two(c.error_sd, |s| [s.q68, s.q95], 2),
-        );
-    }
-    text + "\n"
+        ]
+    };
+    table(columns, study.levels.iter().filter(|c| c.factor == factor).map(row))
 }
 
 /// What kind of wrong the wrong matches are.
 fn wrong_matches(study: &VisionStudy) -> String {
-    let mut text = "## Wrong matches\n\nOf the matches that pass the check and are wrong, at all distances: how many lie on the same \
-                    instance as the home feature (the right thing, another mark on it), and how many within 30 pixels of the right \
-                    place. What is left is wild.\n\n| world | wrong of all | same instance | within 30 pixels | wild: neither \
-                    instance nor place |\n|---|---|---|---|---|\n"
-        .to_owned();
-    for (world, _) in &study.worlds {
-        let cells: Vec<&Cell> = of(study, world, Axis::Distance).collect();
-        let sum = |value: fn(&Cell) -> usize| cells.iter().map(|c| value(c)).sum::<usize>();
-        let (wrong, same, near, wild) =
-            (sum(|c| c.wrong), sum(|c| c.wrong_same_instance), sum(|c| c.wrong_near), sum(|c| c.wrong_wild));
-        let matches: f64 = cells.iter().map(|c| c.matches * c.panoramas as f64).sum();
+    let row = |(world, _): &(String, String)| {
+        let levels: Vec<&LevelScore> = of(study, world, Factor::Distance).collect();
+        let sum = |value: fn(&LevelScore) -> usize| levels.iter().map(|c| value(c)).sum::<usize>();
+        let wrong = sum(|c| c.wrong);
+        let matches: f64 = levels.iter().map(|c| c.matches * c.panoramas as f64).sum();
         let percent = |count: usize| format!("{count} ({:.0} %)", 100.0 * count as f64 / wrong.max(1) as f64);
-        let _ = writeln!(
-            text,
-            "| {world} | {wrong} of {matches:.0} ({:.1} %) | {} | {} | {} |",
-            100.0 * wrong as f64 / matches.max(1.0),
-            percent(same),
-            percent(near),
-            percent(wild)
-        );
-    }
-    text + "\n"
+        [
+            world.clone(),
+            format!("{wrong} of {matches:.0} ({:.1} %)", 100.0 * wrong as f64 / matches.max(1.0)),
+            percent(sum(|c| c.wrong_same_instance)),
+            percent(sum(|c| c.wrong_near)),
+            percent(sum(|c| c.wrong_wild)),
+        ]
+    };
+    let columns = "world | wrong of all | same instance | within 30 pixels | wild: neither instance nor place";
+    format!(
+        "## Wrong matches\n\nOf the matches that pass the check and are wrong, at all distances: how many lie on the same instance as \
+         the home feature (the right thing, another mark on it), and how many within 30 pixels of the right place. What is left is \
+         wild.\n\n{}\n",
+        table(columns, study.worlds.iter().map(row))
+    )
 }
 
 /// Landmark objects.
 fn objects(study: &VisionStudy) -> String {
-    let mut text = "## Landmark objects\n\n`wayhome home --landmarks objects`: neighbouring features clustered, the centre of the cluster \
-                    the bearing. The truth of an object is the mean azimuth of its features' places.\n\n| world | distance (m) | objects \
-                    a panorama | error median, 95 % (degrees) | 68 %, 95 % (stated sd) |\n|---|---|---|---|---|\n"
-        .to_owned();
-    for c in study.cells.iter().filter(|c| c.axis == Axis::Distance) {
-        let (Some(degrees), Some(sd)) = (c.object_error_deg, c.object_error_sd) else { continue };
-        let _ = writeln!(
-            text,
-            "| {} | {} | {:.1} | {:.3}, {:.3} | {:.2}, {:.2} |",
-            c.world, c.level, c.objects, degrees.median, degrees.q95, sd.q68, sd.q95
-        );
-    }
-    text + "\n"
+    let row = |c: &LevelScore| {
+        let (world, level, objects) = (c.world.clone(), c.level.to_string(), format!("{:.1}", c.objects));
+        [
+            world,
+            level,
+            objects,
+            two(c.object_error_deg, |s| [s.median, s.q95], 3),
+            two(c.object_error_sd, |s| [s.q68, s.q95], 2),
+        ]
+    };
+    let seen = study.levels.iter().filter(|c| c.factor == Factor::Distance && c.object_error_deg.is_some());
+    let columns = "world | distance (m) | objects a panorama | error median, 95 % (degrees) | 68 %, 95 % (stated sd)";
+    format!(
+        "## Landmark objects\n\n`wayhome home --landmarks objects`: neighbouring features clustered, the centre of the cluster the \
+         bearing. The truth of an object is the mean azimuth of its features' places.\n\n{}\n",
+        table(columns, seen.map(row))
+    )
 }

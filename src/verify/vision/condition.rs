@@ -8,11 +8,11 @@ use crate::panorama::Panorama;
 use crate::random::{Stream, standard_normal};
 use crate::world::{CameraPreset, LightPreset};
 
-/// One condition is changed at a time.
+/// What is changed, one factor at a time, in the order of the report.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, EnumMessage, IntoStaticStr, VariantArray)]
 #[serde(rename_all = "kebab-case")]
 #[strum(serialize_all = "kebab-case")]
-pub enum Axis {
+pub enum Factor {
     /// Distance from home, 0.25 to 3 m.
     Distance,
     /// Turn since home, 0 to 180 degrees.
@@ -21,57 +21,24 @@ pub enum Axis {
     Gain,
     /// Exponent on all grey levels, 0.5 to 2, white staying white.
     Gamma,
-    /// Standard deviation of noise on each channel of each pixel, at home too, 0 to 20 grey levels of 255.
-    Noise,
-    /// Share of the turn that is hidden by things which were not there, 0 to 70 %.
-    Occlusion,
     /// Light of the world, by its presets.
     Light,
+    /// Standard deviation of noise on each channel of each pixel, at home too, 0 to 20 grey levels of 255.
+    Noise,
     /// Camera, by its presets.
     Camera,
+    /// Share of the turn that is hidden by things which were not there, 0 to 70 %.
+    Occlusion,
 }
 
-/// Light presets and their names, the home panorama's first.
-const LIGHTS: [(LightPreset, &str); 5] = [
-    (LightPreset::Day, "day"),
-    (LightPreset::Overcast, "overcast"),
-    (LightPreset::Glare, "glare"),
-    (LightPreset::Evening, "evening"),
-    (LightPreset::Night, "night"),
-];
-
-/// Camera presets and their names, the home panorama's first.
-const CAMERAS: [(CameraPreset, &str); 5] = [
-    (CameraPreset::Ideal, "ideal"),
-    (CameraPreset::Decent, "decent"),
-    (CameraPreset::Cheap, "cheap"),
-    (CameraPreset::Dirty, "dirty"),
-    (CameraPreset::Night, "night"),
-];
-
-impl Axis {
-    /// All, in the order of the report.
-    pub const ALL: [Self; 8] =
-        [Self::Distance, Self::Rotation, Self::Gain, Self::Gamma, Self::Light, Self::Noise, Self::Camera, Self::Occlusion];
-
+impl Factor {
     /// Name in files.
     #[must_use]
     pub fn name(self) -> &'static str {
         self.into()
     }
 
-    /// What a level is called: a name or a number.
-    #[must_use]
-    pub fn label(self, level: f64) -> String {
-        let name = match self {
-            Self::Light => LIGHTS.get(level as usize).map(|(_, name)| *name),
-            Self::Camera => CAMERAS.get(level as usize).map(|(_, name)| *name),
-            _ => None,
-        };
-        name.map_or_else(|| level.to_string(), str::to_owned)
-    }
-
-    /// The levels that are measured. Those that have names are counted.
+    /// The levels that are measured. Presets are counted in their order, the home panorama's first.
     #[must_use]
     pub fn levels(self) -> &'static [f64] {
         match self {
@@ -82,6 +49,17 @@ impl Axis {
             Self::Noise => &[0.0, 2.0, 5.0, 10.0, 20.0],
             Self::Occlusion => &[0.0, 0.1, 0.3, 0.5, 0.7],
             Self::Light | Self::Camera => &[0.0, 1.0, 2.0, 3.0, 4.0],
+        }
+    }
+
+    /// What a level is called: the preset's name or the number.
+    #[must_use]
+    pub fn label(self, level: f64) -> String {
+        let condition = Condition::at(self, level);
+        match self {
+            Self::Light => <&str>::from(condition.light).to_owned(),
+            Self::Camera => <&str>::from(condition.camera).to_owned(),
+            _ => level.to_string(),
         }
     }
 }
@@ -108,21 +86,22 @@ impl Condition {
     pub const CLEAR: Self =
         Self { gain: 1.0, gamma: 1.0, noise: 0.0, occlusion: 0.0, light: LightPreset::Day, camera: CameraPreset::Ideal };
 
-    /// The condition at a level of an axis.
+    /// The condition at a level of a factor.
     #[must_use]
-    pub fn at(axis: Axis, level: f64) -> Self {
-        match axis {
-            Axis::Distance | Axis::Rotation => Self::CLEAR,
-            Axis::Gain => Self { gain: level, ..Self::CLEAR },
-            Axis::Gamma => Self { gamma: level, ..Self::CLEAR },
-            Axis::Noise => Self { noise: level, ..Self::CLEAR },
-            Axis::Occlusion => Self { occlusion: level, ..Self::CLEAR },
-            Axis::Light => Self { light: LIGHTS[(level as usize).min(LIGHTS.len() - 1)].0, ..Self::CLEAR },
-            Axis::Camera => Self { camera: CAMERAS[(level as usize).min(CAMERAS.len() - 1)].0, ..Self::CLEAR },
+    pub fn at(factor: Factor, level: f64) -> Self {
+        match factor {
+            Factor::Distance | Factor::Rotation => Self::CLEAR,
+            Factor::Gain => Self { gain: level, ..Self::CLEAR },
+            Factor::Gamma => Self { gamma: level, ..Self::CLEAR },
+            Factor::Noise => Self { noise: level, ..Self::CLEAR },
+            Factor::Occlusion => Self { occlusion: level, ..Self::CLEAR },
+            Factor::Light => Self { light: preset(&LightPreset::ALL, level), ..Self::CLEAR },
+            Factor::Camera => Self { camera: preset(&CameraPreset::ALL, level), ..Self::CLEAR },
         }
     }
 
-    /// Makes of a rendered panorama what is seen under this condition; light and camera are there already. What is hidden loses its range and instance.
+    /// Makes of a rendered panorama what is seen under this condition; light and camera are there already. What is hidden loses
+    /// its range and instance.
     pub fn apply(&self, panorama: &mut Panorama, stream: &mut Stream) {
         if self.occlusion > 0.0 {
             hide(panorama, self.occlusion, stream);
@@ -144,6 +123,11 @@ impl Condition {
             }
         }
     }
+}
+
+/// The preset of this number.
+fn preset<T: Copy>(presets: &[T], number: f64) -> T {
+    presets[(number as usize).min(presets.len() - 1)]
 }
 
 /// Widths of the things that hide others, rad: of people from 3 m to 1 m away.
@@ -204,13 +188,13 @@ mod tests {
             panorama
         };
         assert_eq!(apply(Condition::CLEAR), grey(100));
-        assert!(apply(Condition::at(Axis::Gain, 1.4)).rgba.chunks(4).all(|p| p[0] == 140));
-        assert!(apply(Condition::at(Axis::Gain, 4.0)).rgba.chunks(4).all(|p| p[0] == 255));
+        assert!(apply(Condition::at(Factor::Gain, 1.4)).rgba.chunks(4).all(|p| p[0] == 140));
+        assert!(apply(Condition::at(Factor::Gain, 4.0)).rgba.chunks(4).all(|p| p[0] == 255));
         let half = (255.0 * (100.0_f64 / 255.0).sqrt()).round() as u8;
-        assert!(apply(Condition::at(Axis::Gamma, 0.5)).rgba.chunks(4).all(|p| p[1] == half));
-        let hidden = apply(Condition::at(Axis::Occlusion, 0.3)).range_m.iter().filter(|r| **r == 0.0).count();
+        assert!(apply(Condition::at(Factor::Gamma, 0.5)).rgba.chunks(4).all(|p| p[1] == half));
+        let hidden = apply(Condition::at(Factor::Occlusion, 0.3)).range_m.iter().filter(|r| **r == 0.0).count();
         assert_eq!(hidden, 108 * 40);
-        let noisy = apply(Condition::at(Axis::Noise, 5.0));
+        let noisy = apply(Condition::at(Factor::Noise, 5.0));
         let values: Vec<f64> = noisy.rgba.chunks(4).flat_map(|p| &p[..3]).map(|v| f64::from(*v) - 100.0).collect();
         let variance = values.iter().map(|v| v * v).sum::<f64>() / values.len() as f64;
         // 43,200 draws: three standard errors are 2 %; rounding adds 1/12.

@@ -1,5 +1,7 @@
 //! How fast sets are made, beside what rendering and encoding take by themselves, and which coding of pictures is worth its time.
 
+pub mod page;
+
 use std::ops::ControlFlow;
 use std::path::Path;
 use std::time::Instant;
@@ -16,7 +18,7 @@ use crate::panorama_set::{
     LayoutKind, encode_instance, encode_range, encode_rgb, modes, packed_instance, packed_range, packed_rgb,
 };
 use crate::render::{CpuRenderer, Renderer, Scene, View};
-use crate::study::statistics::quantile;
+use crate::verify::speed::{median, pool_of, processor, seconds};
 use crate::world::World;
 
 /// Sizes that are measured: Vardy's and the usual one.
@@ -31,7 +33,7 @@ pub const LAYOUTS: [LayoutKind; 2] = [LayoutKind::Folder, LayoutKind::Webdataset
 
 /// Panoramas a second by themselves and all together.
 #[derive(Debug, Clone, Serialize)]
-pub struct Rates {
+pub struct SetRates {
     /// Layout of the set.
     pub layout: LayoutKind,
     /// Columns.
@@ -54,11 +56,11 @@ pub struct Rates {
     pub pipeline_per_s: f64,
 }
 
-impl Rates {
-    /// What both stages can do at most when they share all threads: the inverse of the sum of their times.
+impl SetRates {
+    /// Greatest share of the slower stage that is possible where both share all threads: the inverse of the sum of their times.
     #[must_use]
-    pub fn bound_per_s(&self) -> f64 {
-        1.0 / (1.0 / self.render_per_s + 1.0 / self.encode_per_s)
+    pub fn bound_of_slower(&self) -> f64 {
+        1.0 / (1.0 / self.render_per_s + 1.0 / self.encode_per_s) / self.render_per_s.min(self.encode_per_s)
     }
 
     /// Share of the slower stage alone with all threads to itself.
@@ -89,13 +91,13 @@ pub struct CodingCost {
 
 /// What was measured.
 #[derive(Debug, Clone, Serialize)]
-pub struct Findings {
+pub struct DatasetSpeeds {
     /// Processor.
     pub processor: String,
     /// World.
     pub world: String,
     /// Rates by size.
-    pub rates: Vec<Rates>,
+    pub rates: Vec<SetRates>,
     /// Codings of pictures of the larger size.
     pub codings: Vec<CodingCost>,
     /// Size of those.
@@ -107,7 +109,7 @@ pub struct Findings {
 ///
 /// # Errors
 /// When the world cannot be rendered, or a set cannot be written; [`Error::Interrupted`] when `watch` breaks.
-pub fn measure(world: &World, frames: usize, scratch: &Path, watch: &dyn Fn(&str) -> ControlFlow<()>) -> Result<Findings> {
+pub fn measure(world: &World, frames: usize, scratch: &Path, watch: &dyn Fn(&str) -> ControlFlow<()>) -> Result<DatasetSpeeds> {
     let go_on = |what: &str| if watch(what).is_break() { Err(Error::Interrupted) } else { Ok(()) };
     let mut rates = Vec::new();
     for (width, height) in SIZES {
@@ -116,8 +118,7 @@ pub fn measure(world: &World, frames: usize, scratch: &Path, watch: &dyn Fn(&str
     go_on("codings")?;
     let size = SIZES[SIZES.len() - 1];
     let codings = codings(&samples(world, world.projection_of_size(size.0, size.1))?);
-    let processor = crate::verify::render::processor();
-    Ok(Findings { processor, world: world.spec.name.clone(), rates, codings, codings_px: [size.0, size.1] })
+    Ok(DatasetSpeeds { processor: processor(), world: world.spec.name.clone(), rates, codings, codings_px: [size.0, size.1] })
 }
 
 /// Panoramas from around home.
@@ -149,23 +150,18 @@ fn measure_size(
     frames: usize,
     scratch: &Path,
     go_on: &dyn Fn() -> Result<()>,
-) -> Result<Vec<Rates>> {
+) -> Result<Vec<SetRates>> {
     go_on()?;
     let plan = Plan::new(world, request(frames, size, LAYOUTS[0]))?;
     let projection = plan.projection;
     let (scene, bodies) = (Scene::new(world)?, world.body_poses());
     let views: Vec<_> = plan.stage_frames(0).map(|f| View { projection, robot: f.robot, bodies: &bodies }).collect();
     let pictures = samples(world, projection)?;
-    let per_s = |start: Instant| frames as f64 / start.elapsed().as_secs_f64();
-    let render = || -> Result<f64> {
-        let start = Instant::now();
-        CpuRenderer::new().render_batch(&scene, &views, &mut |_, _| Ok(()))?;
-        Ok(per_s(start))
-    };
-    let encode = || -> Result<f64> {
-        let start = Instant::now();
-        (0..frames).into_par_iter().try_for_each(|k| encode_all(&pictures[k % SAMPLES]).map(|_| ()))?;
-        Ok(per_s(start))
+    let per_s = |seconds: f64| frames as f64 / seconds;
+    let render = || seconds(|| CpuRenderer::new().render_batch(&scene, &views, &mut |_, _| Ok(()))).map(per_s);
+    let encode = || {
+        let pictures = (0..frames).into_par_iter().map(|k| &pictures[k % SAMPLES]);
+        seconds(|| pictures.try_for_each(|picture| encode_all(picture).map(|_| ()))).map(per_s)
     };
     let scratch = tempfile::Builder::new()
         .prefix("wayhome-dataset-bench-")
@@ -183,9 +179,9 @@ fn measure_size(
             start.get_or_insert_with(Instant::now);
             ControlFlow::Continue(())
         });
-        made.map(|_| per_s(start.unwrap_or_else(Instant::now)))
+        made.map(|_| per_s(start.unwrap_or_else(Instant::now).elapsed().as_secs_f64()))
     };
-    let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().map_err(|e| Error::Threads(e.to_string()))?;
+    let one = pool_of(1)?;
     // In turns, so that what else the machine does weighs on all alike.
     let mut rounds: [Vec<f64>; 4] = Default::default();
     let mut pipelines = LAYOUTS.map(|layout| (layout, Vec::new()));
@@ -202,11 +198,10 @@ fn measure_size(
         go_on()?;
         rounds[3].push(one.install(encode)?);
     }
-    let median = |rates: Vec<f64>| quantile(&rates, 0.5).unwrap_or(f64::NAN);
-    let [render_per_s, encode_per_s, render_one_per_s, encode_one_per_s] = rounds.map(median);
+    let [render_per_s, encode_per_s, render_one_per_s, encode_one_per_s] = rounds.map(|rates| median(&rates));
     let threads = rayon::current_num_threads();
     let (width, height) = size;
-    let rates = pipelines.map(|(layout, rates)| Rates {
+    let rates = pipelines.map(|(layout, rates)| SetRates {
         layout,
         width,
         height,
@@ -216,7 +211,7 @@ fn measure_size(
         encode_per_s,
         render_one_per_s,
         encode_one_per_s,
-        pipeline_per_s: median(rates),
+        pipeline_per_s: median(&rates),
     });
     Ok(rates.into())
 }
@@ -243,8 +238,7 @@ fn codings(pictures: &[Panorama]) -> Vec<CodingCost> {
                     all += packed.len();
                 }
             }
-            let ms = quantile(&times, 0.5).unwrap_or(f64::NAN);
-            costs.push(CodingCost { channel, coding, ms, share: bytes as f64 / all as f64 });
+            costs.push(CodingCost { channel, coding, ms: median(&times), share: bytes as f64 / all as f64 });
         }
     }
     costs
