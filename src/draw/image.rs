@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
-use image::{DynamicImage, ImageBuffer, Luma};
+use image::{DynamicImage, ImageBuffer};
 
 use crate::error::{Error, Result};
 use crate::panorama::Panorama;
@@ -23,7 +23,7 @@ pub fn colours_png(panorama: &Panorama, name: &str) -> Result<Vec<u8>> {
 pub fn range_png(panorama: &Panorama, name: &str) -> Result<Vec<u8>> {
     // The cast saturates: below zero at 0, above at 65535.
     let millimetres = panorama.range_m.iter().map(|r| (f64::from(*r) * 1000.0).round() as u16).collect();
-    encode_filled(buffer::<Luma<u16>>(panorama, millimetres).map(DynamicImage::ImageLuma16), name)
+    encode_16_bits(panorama, millimetres, name)
 }
 
 /// The instance ids, 16 bits.
@@ -31,26 +31,19 @@ pub fn range_png(panorama: &Panorama, name: &str) -> Result<Vec<u8>> {
 /// # Errors
 /// When the panorama has no instances or cannot be encoded; `name` is what the error calls it.
 pub fn instance_png(panorama: &Panorama, name: &str) -> Result<Vec<u8>> {
-    encode_filled(buffer::<Luma<u16>>(panorama, panorama.instance.clone()).map(DynamicImage::ImageLuma16), name)
+    encode_16_bits(panorama, panorama.instance.clone(), name)
 }
 
-type Buffer<P> = ImageBuffer<P, Vec<<P as image::Pixel>::Subpixel>>;
-
-/// `None` when the data does not fill the panorama.
-fn buffer<P: image::Pixel>(panorama: &Panorama, data: Vec<P::Subpixel>) -> Option<Buffer<P>> {
+fn encode_16_bits(panorama: &Panorama, values: Vec<u16>, name: &str) -> Result<Vec<u8>> {
     let (width, height) = (panorama.projection.width, panorama.projection.height);
-    (data.len() == panorama.projection.pixels() * usize::from(P::CHANNEL_COUNT))
-        .then(|| ImageBuffer::from_raw(width, height, data))
-        .flatten()
-}
-
-fn encode_filled(image: Option<DynamicImage>, name: &str) -> Result<Vec<u8>> {
+    let filled = values.len() == panorama.projection.pixels();
+    let image = filled.then(|| ImageBuffer::from_raw(width, height, values)).flatten();
     let image = image.ok_or_else(|| Error::Invalid {
         what: format!("panorama for {name}"),
         found: "a channel of another size than the panorama".into(),
         allowed: "a value for every pixel".into(),
     })?;
-    encode(&image, name)
+    encode(&DynamicImage::ImageLuma16(image), name)
 }
 
 /// An image as a PNG file, by the fast compression: the better one takes twenty times as long for a tenth less.

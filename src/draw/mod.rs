@@ -6,4 +6,5 @@ pub mod chart;
 pub mod image;
 pub mod map;
 pub mod markdown;
+pub(crate) mod shapes;
 pub mod sheet;

@@ -1,5 +1,9 @@
 //! Axes: from values to pixels, and where the ticks are.
 
+use svg::node::element::Group;
+
+use crate::draw::shapes::{line, number, px, text, ticks};
+
 /// An axis with its name, its scale, and its range where it is told.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Axis {
@@ -81,6 +85,22 @@ impl Placed {
         let share = (self.axis.measure(value) - self.low) / (self.high - self.low);
         self.page[0] + share * (self.page[1] - self.page[0])
     }
+
+    /// Draws a vertical axis: lines from `left` to `right` into the grid; into the names those of the ticks and its own.
+    pub(crate) fn draw_vertical(&self, [left, right]: [f64; 2], mut grid: Group, mut names: Group) -> [Group; 2] {
+        for (at, label) in &self.ticks {
+            grid = grid.add(line([left, *at], [right, *at]));
+            names = names.add(text(label, left - 9.0, at + 4.0, 12.0).set("text-anchor", "end"));
+        }
+        [grid, names]
+    }
+
+    /// The name of a vertical axis, upright beside it.
+    pub(crate) fn vertical_name(&self) -> svg::node::element::Text {
+        let middle = 0.5 * (self.page[0] + self.page[1]);
+        let turn = format!("rotate(-90 22 {})", px(middle));
+        text(&self.axis.label, 22.0, middle, 13.0).set("text-anchor", "middle").set("transform", turn)
+    }
 }
 
 /// Multiples of 1, 2 or 5 times a power of ten, about six of them.
@@ -88,28 +108,22 @@ fn even_ticks(low: f64, high: f64) -> Vec<(f64, String)> {
     let rough = (high - low) / 6.0;
     let power = libm::pow(10.0, libm::floor(libm::log10(rough)));
     let step = [1.0, 2.0, 5.0, 10.0].iter().map(|f| f * power).find(|s| *s >= rough * 0.999).unwrap_or(10.0 * power);
-    let decimals = (-libm::floor(libm::log10(step) + 1e-9)).max(0.0) as usize;
-    let (first, last) = (libm::ceil(low / step - 1e-9) as i64, libm::floor(high / step + 1e-9) as i64);
-    (first..=last).map(|k| k as f64 * step).map(|v| (v, label(v, decimals))).collect()
+    ticks(step, low, high)
 }
 
 /// Powers of ten; with fewer than three of them their double and fivefold too.
 fn log_ticks(low: f64, high: f64) -> Vec<(f64, String)> {
-    let ticks = |factors: &[f64]| -> Vec<(f64, String)> {
+    let of = |factors: &[f64]| -> Vec<(f64, String)> {
         let (first, last) = (libm::floor(low) as i32, libm::ceil(high) as i32);
         (first..=last)
             .flat_map(|power| factors.iter().map(move |factor| (power, *factor)))
             .map(|(power, factor)| (factor * libm::pow(10.0, f64::from(power)), power))
             .filter(|(v, _)| (low - 1e-9..=high + 1e-9).contains(&libm::log10(*v)))
-            .map(|(v, power)| (v, label(v, (-power).max(0) as usize)))
+            .map(|(v, power)| (v, number(v, (-power).max(0) as usize)))
             .collect()
     };
-    let tens = ticks(&[1.0]);
-    if tens.len() >= 3 { tens } else { ticks(&[1.0, 2.0, 5.0]) }
-}
-
-fn label(value: f64, decimals: usize) -> String {
-    format!("{:.decimals$}", value + 0.0).replace('-', "\u{2212}")
+    let tens = of(&[1.0]);
+    if tens.len() >= 3 { tens } else { of(&[1.0, 2.0, 5.0]) }
 }
 
 #[cfg(test)]

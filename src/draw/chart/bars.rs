@@ -2,7 +2,8 @@
 
 use svg::node::element::Group;
 
-use super::{Axis, FAINT_INK, INK, SERIES, Stroke, line, px, rectangle, stroked, text, wrapped};
+use super::{Axis, SERIES, Stroke, stroked, titled, wrapped};
+use crate::draw::shapes::{FAINT_INK, GRID, INK, line, rectangle, text};
 
 /// Size of a chart, px.
 const WIDTH_PX: f64 = 900.0;
@@ -48,15 +49,9 @@ impl Bars {
         let values: Vec<f64> = self.series.iter().flat_map(|s| s.values.iter().flatten().copied()).chain([0.0]).collect();
         let axis = Axis::linear(self.axis.clone()).from(0.0);
         let y = axis.place(&values, [bottom, top], false);
-        let mut grid = Group::new().set("stroke", "#e8e7e3").set("stroke-width", 1);
-        let mut names = Group::new().set("fill", INK);
-        for (at, label) in &y.ticks {
-            grid = grid.add(line([left, *at], [right, *at]));
-            names = names.add(text(label, left - 9.0, at + 4.0, 12.0).set("text-anchor", "end"));
-        }
-        let middle = 0.5 * (top + bottom);
-        let turn = format!("rotate(-90 22 {})", px(middle));
-        names = names.add(text(&self.axis, 22.0, middle, 13.0).set("text-anchor", "middle").set("transform", turn));
+        let grid = Group::new().set("stroke", GRID).set("stroke-width", 1);
+        let [grid, mut names] = y.draw_vertical([left, right], grid, Group::new().set("fill", INK));
+        names = names.add(y.vertical_name());
         let mut bars = Group::new();
         let group_px = (right - left) / self.groups.len().max(1) as f64;
         let bar_px = FILLED * group_px / self.series.len().max(1) as f64;
@@ -81,13 +76,7 @@ impl Bars {
             }
             names = names.add(text(name, 0.5 * (from + to), bottom + 20.0, 13.0).set("text-anchor", "middle"));
         }
-        svg::Document::new()
-            .set("viewBox", (0, 0, WIDTH_PX, HEIGHT_PX))
-            .set("width", px(WIDTH_PX))
-            .set("height", px(HEIGHT_PX))
-            .set("font-family", "Helvetica, Arial, 'Liberation Sans', 'DejaVu Sans', sans-serif")
-            .add(rectangle([0.0, 0.0, WIDTH_PX, HEIGHT_PX]).set("fill", "#ffffff"))
-            .add(text(&self.title, left, 28.0, 15.0).set("font-weight", "bold").set("fill", INK))
+        titled(&self.title, [WIDTH_PX, HEIGHT_PX], left, None)
             .add(grid)
             .add(bars)
             .add(stroked(line([left, bottom], [right, bottom]), &Stroke { colour: FAINT_INK, width_px: 1.0, dashes: "" }))
@@ -100,24 +89,22 @@ impl Bars {
     fn legend(&self) -> Group {
         let mut group = Group::new().set("fill", INK);
         let mut at = PLOT_PX[1] + 8.0;
-        let mut entry = |group: Group, label: &str| {
-            let mut group = group;
+        let labels = self.series.iter().map(|series| &series.label).chain([&self.bound.0]);
+        for (k, label) in labels.enumerate() {
+            group = if k < self.series.len() {
+                group.add(rectangle([LEGEND_PX, at - 6.0, LEGEND_PX + 16.0, at + 6.0]).set("fill", colour(k)))
+            } else {
+                let level = line([LEGEND_PX - 2.0, at], [LEGEND_PX + 18.0, at]);
+                group.add(stroked(level, &Stroke::EXACT.dashed("5 3")))
+            };
             for part in wrapped(label, 26) {
                 group = group.add(text(&part, LEGEND_PX + 26.0, at + 4.0, 12.0));
                 at += 15.0;
             }
             at += 5.0;
-            (group, at)
-        };
-        let mut next = PLOT_PX[1] + 8.0;
-        for (k, series) in self.series.iter().enumerate() {
-            group = group.add(rectangle([LEGEND_PX, next - 6.0, LEGEND_PX + 16.0, next + 6.0]).set("fill", colour(k)));
-            (group, next) = entry(group, &series.label);
         }
-        group = group.add(stroked(line([LEGEND_PX - 2.0, next], [LEGEND_PX + 18.0, next]), &Stroke::EXACT.dashed("5 3")));
-        (group, next) = entry(group, &self.bound.0);
         for (k, part) in wrapped(&self.note, 32).iter().enumerate() {
-            group = group.add(text(part, LEGEND_PX, next + 12.0 + 15.0 * k as f64, 12.0).set("fill", FAINT_INK));
+            group = group.add(text(part, LEGEND_PX, at + 12.0 + 15.0 * k as f64, 12.0).set("fill", FAINT_INK));
         }
         group
     }

@@ -18,8 +18,10 @@ mod axis;
 mod bars;
 mod ramp;
 
-use svg::node::element::{Circle, ClipPath, Definitions, Group, Line, Polyline, Rectangle, Text};
+use svg::node::element::{Circle, ClipPath, Definitions, Group};
 
+pub(crate) use crate::draw::shapes::{FAINT_INK, INK, line, px, rectangle, text};
+use crate::draw::shapes::{GRID, circle, page, polyline};
 pub use axis::Axis;
 use axis::Placed;
 pub use bars::{BarSeries, Bars};
@@ -32,9 +34,6 @@ const HEIGHT_PX: f64 = 440.0;
 const PLOT_PX: [f64; 4] = [78.0, 50.0, 560.0, 382.0];
 /// Where the legend begins, px.
 const LEGEND_PX: f64 = 584.0;
-
-pub(crate) const INK: &str = "#1a1a1a";
-pub(crate) const FAINT_INK: &str = "#6b6b6b";
 
 /// Colours that people with any colour vision tell apart (Okabe and Ito 2008), for series in order.
 pub const SERIES: [&str; 6] = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9"];
@@ -185,14 +184,7 @@ impl Chart {
             layers = layers.add(draw(layer, &x, &y, [&self.x, &self.y]));
         }
         let (grid, axes) = self.draw_axes(&x, &y);
-        svg::Document::new()
-            .set("viewBox", (0, 0, WIDTH_PX, HEIGHT_PX))
-            .set("width", px(WIDTH_PX))
-            .set("height", px(HEIGHT_PX))
-            .set("font-family", "Helvetica, Arial, 'Liberation Sans', 'DejaVu Sans', sans-serif")
-            .add(Definitions::new().add(clip))
-            .add(rectangle([0.0, 0.0, WIDTH_PX, HEIGHT_PX]).set("fill", "#ffffff"))
-            .add(text(&self.title, left, 28.0, 15.0).set("font-weight", "bold").set("fill", INK))
+        titled(&self.title, [WIDTH_PX, HEIGHT_PX], left, Some(Definitions::new().add(clip)))
             .add(grid)
             .add(layers)
             .add(axes)
@@ -203,7 +195,7 @@ impl Chart {
 
     fn draw_axes(&self, x: &Placed, y: &Placed) -> (Group, Group) {
         let [left, top, right, bottom] = PLOT_PX;
-        let mut grid = Group::new().set("stroke", "#e8e7e3").set("stroke-width", 1);
+        let mut grid = Group::new().set("stroke", GRID).set("stroke-width", 1);
         let mut marks = Group::new().set("stroke", FAINT_INK).set("stroke-width", 1);
         let mut names = Group::new().set("fill", INK);
         for (at, label) in &x.ticks {
@@ -211,16 +203,13 @@ impl Chart {
             marks = marks.add(line([*at, bottom], [*at, bottom + 5.0]));
             names = names.add(text(label, *at, bottom + 19.0, 12.0).set("text-anchor", "middle"));
         }
-        for (at, label) in &y.ticks {
-            grid = grid.add(line([left, *at], [right, *at]));
+        for (at, _) in &y.ticks {
             marks = marks.add(line([left - 5.0, *at], [left, *at]));
-            names = names.add(text(label, left - 9.0, at + 4.0, 12.0).set("text-anchor", "end"));
         }
+        let [grid, mut names] = y.draw_vertical([left, right], grid, names);
         marks = marks.add(line([left, top], [left, bottom])).add(line([left, bottom], [right, bottom]));
         names = names.add(text(&self.x.label, 0.5 * (left + right), bottom + 43.0, 13.0).set("text-anchor", "middle"));
-        let middle = 0.5 * (top + bottom);
-        let turn = format!("rotate(-90 22 {})", px(middle));
-        names = names.add(text(&self.y.label, 22.0, middle, 13.0).set("text-anchor", "middle").set("transform", turn));
+        names = names.add(y.vertical_name());
         (grid, Group::new().add(marks).add(names))
     }
 
@@ -260,17 +249,25 @@ impl Chart {
     }
 }
 
+/// A page with a title above what begins at `left`.
+fn titled(title: &str, [width, height]: [f64; 2], left: f64, definitions: Option<Definitions>) -> svg::Document {
+    let mut document = page(width, height);
+    if let Some(definitions) = definitions {
+        document = document.add(definitions);
+    }
+    document
+        .add(rectangle([0.0, 0.0, width, height]).set("fill", "#ffffff"))
+        .add(text(title, left, 28.0, 15.0).set("font-weight", "bold").set("fill", INK))
+}
+
 fn draw(layer: &Layer, x: &Placed, y: &Placed, axes: [&Axis; 2]) -> Group {
     let at = |point: &[f64; 2]| [x.at(point[0]), y.at(point[1])];
     let seen = |point: &[f64; 2]| point.iter().all(|v| v.is_finite());
     match layer {
-        Layer::Line(points, stroke, _) => {
-            points.split(|point| !seen(point)).filter(|piece| piece.len() > 1).fold(Group::new(), |group, piece| {
-                let corners: Vec<String> = piece.iter().map(at).map(|[x, y]| format!("{},{}", px(x), px(y))).collect();
-                let line = Polyline::new().set("points", corners.join(" ")).set("fill", "none");
-                group.add(stroked(line.set("stroke-linejoin", "round"), stroke))
-            })
-        }
+        Layer::Line(points, stroke, _) => points
+            .split(|point| !seen(point))
+            .filter(|piece| piece.len() > 1)
+            .fold(Group::new(), |group, piece| group.add(stroked(polyline(piece.iter().map(at)), stroke))),
         Layer::Points(points, mark, _) => {
             points.iter().filter(|point| seen(point)).fold(Group::new(), |group, point| group.add(disc(at(point), mark)))
         }
@@ -322,33 +319,8 @@ fn wrapped(text: &str, most: usize) -> Vec<String> {
     lines
 }
 
-/// A length with two decimals, without a needless tail.
-pub(crate) fn px(value: f64) -> String {
-    let text = format!("{value:.2}");
-    let text = text.trim_end_matches('0').trim_end_matches('.');
-    if text == "-0" { "0".to_owned() } else { text.to_owned() }
-}
-
-pub(crate) fn text(content: &str, x: f64, y: f64, size_px: f64) -> Text {
-    Text::new(content).set("x", px(x)).set("y", px(y)).set("font-size", px(size_px))
-}
-
-pub(crate) fn line(a: [f64; 2], b: [f64; 2]) -> Line {
-    Line::new().set("x1", px(a[0])).set("y1", px(a[1])).set("x2", px(b[0])).set("y2", px(b[1]))
-}
-
-pub(crate) fn rectangle([left, top, right, bottom]: [f64; 4]) -> Rectangle {
-    Rectangle::new().set("x", px(left)).set("y", px(top)).set("width", px(right - left)).set("height", px(bottom - top))
-}
-
 pub(crate) fn disc(at: [f64; 2], mark: &Mark) -> Circle {
-    Circle::new()
-        .set("cx", px(at[0]))
-        .set("cy", px(at[1]))
-        .set("r", px(mark.radius_px))
-        .set("fill", mark.colour)
-        .set("stroke", "#ffffff")
-        .set("stroke-width", 1)
+    circle(at, mark.radius_px).set("fill", mark.colour).set("stroke", "#ffffff").set("stroke-width", 1)
 }
 
 /// Sets a shape's line.

@@ -2,7 +2,7 @@
 
 use svg::node::element::Group;
 
-use super::{INK, rectangle, text};
+use crate::draw::shapes::{INK, blend, rectangle, text};
 
 /// Height of a key with what is below it, px.
 pub(crate) const KEY_PX: f64 = 200.0;
@@ -16,25 +16,22 @@ pub struct Ramp {
     pub high: f64,
 }
 
-const COLOURS: [[f64; 3]; 6] = [
-    [253.0, 247.0, 226.0],
-    [250.0, 214.0, 150.0],
-    [240.0, 160.0, 96.0],
-    [206.0, 92.0, 82.0],
-    [132.0, 45.0, 92.0],
-    [54.0, 20.0, 76.0],
+/// Colours at even steps from the lightest to the darkest.
+const COLOURS: [(f64, [f64; 3]); 6] = [
+    (0.0, [253.0, 247.0, 226.0]),
+    (1.0, [250.0, 214.0, 150.0]),
+    (2.0, [240.0, 160.0, 96.0]),
+    (3.0, [206.0, 92.0, 82.0]),
+    (4.0, [132.0, 45.0, 92.0]),
+    (5.0, [54.0, 20.0, 76.0]),
 ];
 
 impl Ramp {
     /// Colour of a value, and that of a text on it.
     pub(crate) fn colour(&self, value: f64) -> (String, &'static str) {
         let share = ((value - self.low) / (self.high - self.low)).clamp(0.0, 1.0);
-        let place = share * (COLOURS.len() - 1) as f64;
-        let before = (place as usize).min(COLOURS.len() - 2); // NaN becomes 0
-        let t = place - before as f64;
-        let [r, g, b] =
-            [0, 1, 2].map(|k| (COLOURS[before][k] + t * (COLOURS[before + 1][k] - COLOURS[before][k])).round() as u8);
-        (format!("#{r:02x}{g:02x}{b:02x}"), if share > 0.5 { "#ffffff" } else { INK })
+        let colour = blend(&COLOURS, share * (COLOURS.len() - 1) as f64);
+        (colour, if share > 0.5 { "#ffffff" } else { INK })
     }
 
     /// A column of colours with the values at its ends and in its middle.

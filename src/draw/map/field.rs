@@ -4,8 +4,9 @@ use svg::node::element::Group;
 
 use super::MapDrawing;
 use super::legend::Swatch;
-use super::paint::{self, circle, rectangle};
+use super::paint;
 use crate::draw::chart::Ramp;
+use crate::draw::shapes::{INK, circle, rectangle};
 use crate::geometry::Vector2;
 
 /// Colours of a field; neighbours of one colour are drawn as one.
@@ -29,8 +30,7 @@ impl MapDrawing {
             let half = Vector2::new(0.5, -0.5) * size_m;
             let (corner, opposite) = (self.frame.at(first - half), self.frame.at(last + half));
             // A hair of overlap hides the seams that renderers leave between cells.
-            let size = opposite - corner + Vector2::new(0.3, 0.3);
-            let cell = rectangle(corner.x, corner.y, size.x, size.y).set("fill", ramp.colour(value).0);
+            let cell = rectangle([corner.x, corner.y, opposite.x + 0.3, opposite.y + 0.3]).set("fill", ramp.colour(value).0);
             group = std::mem::take(&mut group).add(cell);
         };
         for (middle, value) in cells {
@@ -63,7 +63,7 @@ impl MapDrawing {
         let length = length_m * self.frame.px_per_m;
         for (point, heading_rad) in arrows {
             let tail = self.frame.at(point) - paint::on_page(heading_rad) * (0.5 * length);
-            self.paths = self.paths.add(paint::arrow(tail, length, heading_rad, paint::INK, 1.2));
+            self.paths = self.paths.add(paint::arrow(tail, length, heading_rad, INK, 1.2));
         }
         self.legend.add(Swatch::Arrow, label);
         self

@@ -3,7 +3,7 @@
 use svg::node::element::Group;
 
 use super::WIDTH_PX;
-use super::paint::{FAINT_INK, INK, line, px, text};
+use crate::draw::shapes::{FAINT_INK, GRID, INK, line, px, text, ticks};
 use crate::geometry::Vector2;
 use crate::world::polygon::bounds;
 
@@ -62,28 +62,22 @@ impl Frame {
         step
     }
 
-    /// Whole multiples of the tick distance within a range, as (tick, label).
+    /// Ticks within a range, with what they are called.
     fn ticks(&self, low: f64, high: f64) -> Vec<(f64, String)> {
-        let step = self.tick_m();
-        let decimals = [1.0, 0.1, 0.01].iter().position(|unit| step >= *unit * 0.999).unwrap_or(3);
-        let (first, last) = (libm::ceil(low / step - 1e-9) as i64, libm::floor(high / step + 1e-9) as i64);
-        (first..=last)
-            .map(|k| k as f64 * step)
-            .map(|at| (at, format!("{:.decimals$}", at + 0.0).replace('-', "\u{2212}")))
-            .collect()
+        ticks(self.tick_m(), low, high)
     }
 
     /// Lines through all ticks, over the whole map.
     pub(super) fn draw_grid(&self) -> Group {
-        let mut grid = Group::new().set("stroke", "#e8e7e3").set("stroke-width", 1);
+        let mut grid = Group::new().set("stroke", GRID).set("stroke-width", 1);
         let [left, top, right, bottom] = [LEFT_PX, 0.0, self.right_px(), self.height_px()];
         for (x, _) in self.ticks(self.low.x, self.high.x) {
             let at = self.at(Vector2::new(x, 0.0)).x;
-            grid = grid.add(line(Vector2::new(at, top), Vector2::new(at, bottom)));
+            grid = grid.add(line([at, top], [at, bottom]));
         }
         for (y, _) in self.ticks(self.low.y, self.high.y) {
             let at = self.at(Vector2::new(0.0, y)).y;
-            grid = grid.add(line(Vector2::new(left, at), Vector2::new(right, at)));
+            grid = grid.add(line([left, at], [right, at]));
         }
         grid
     }
@@ -92,17 +86,15 @@ impl Frame {
         let [left, right, bottom] = [LEFT_PX, self.right_px(), self.height_px()];
         let mut marks = Group::new().set("stroke", FAINT_INK).set("stroke-width", 1);
         let mut names = Group::new().set("fill", INK);
-        marks = marks
-            .add(line(Vector2::new(left, 0.0), Vector2::new(left, bottom)))
-            .add(line(Vector2::new(left, bottom), Vector2::new(right, bottom)));
+        marks = marks.add(line([left, 0.0], [left, bottom])).add(line([left, bottom], [right, bottom]));
         for (x, label) in self.ticks(self.low.x, self.high.x) {
             let at = self.at(Vector2::new(x, 0.0)).x;
-            marks = marks.add(line(Vector2::new(at, bottom), Vector2::new(at, bottom + 5.0)));
+            marks = marks.add(line([at, bottom], [at, bottom + 5.0]));
             names = names.add(text(&label, at, bottom + 18.0, 12.0).set("text-anchor", "middle"));
         }
         for (y, label) in self.ticks(self.low.y, self.high.y) {
             let at = self.at(Vector2::new(0.0, y)).y;
-            marks = marks.add(line(Vector2::new(left - 5.0, at), Vector2::new(left, at)));
+            marks = marks.add(line([left - 5.0, at], [left, at]));
             names = names.add(text(&label, left - 9.0, at + 4.0, 12.0).set("text-anchor", "end"));
         }
         let middle = [0.5 * (left + right), 0.5 * bottom];
@@ -121,7 +113,7 @@ impl Frame {
         let bar = Group::new()
             .set("stroke", INK)
             .set("stroke-width", 2)
-            .add(line(Vector2::new(left, y), Vector2::new(right, y)))
+            .add(line([left, y], [right, y]))
             .add(end(left))
             .add(end(right));
         let label = text(&format!("{length_m} m"), left - 8.0, y + 4.0, 12.0).set("text-anchor", "end").set("fill", INK);

@@ -2,7 +2,7 @@
 
 use svg::node::element::Group;
 
-use super::paint::{px, text};
+use crate::draw::shapes::{px, text};
 use crate::geometry::Vector2;
 use crate::world::polygon::{bounds, contains};
 

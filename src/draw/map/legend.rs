@@ -3,8 +3,9 @@
 use svg::node::element::Group;
 
 use super::PathStyle;
-use super::paint::{self, BodyPaint, INK, STARTS, circle, polyline, px, rectangle, text};
+use super::paint::{self, BodyPaint, STARTS, polyline};
 use crate::draw::chart::Ramp;
+use crate::draw::shapes::{INK, circle, rectangle, text};
 use crate::geometry::Vector2;
 
 /// The picture in front of an entry's text.
@@ -93,7 +94,7 @@ impl Swatch {
     fn draw(&self, x: f64, y: f64) -> Group {
         let (left, right) = (Vector2::new(x, y), Vector2::new(x + 26.0, y));
         let middle = 0.5 * (left + right);
-        let area = || rectangle(x + 1.0, y - 6.0, 24.0, 12.0).set("rx", 1);
+        let area = || rectangle([x + 1.0, y - 6.0, x + 25.0, y + 6.0]).set("rx", 1);
         let group = Group::new();
         match self {
             Self::Body(paint) => group.add(paint_body(area(), *paint)),
@@ -111,16 +112,12 @@ impl Swatch {
                 let inner = if *colour == INK { INK } else { "#ffffff" };
                 group.add(paint::robot(middle, 7.0, 0.0, colour, inner))
             }
-            Self::Path(style) => group.add(
-                polyline(&[left, right])
-                    .set("stroke", style.colour)
-                    .set("stroke-width", px(style.width_px))
-                    .set("stroke-dasharray", if style.dashes.is_empty() { "none" } else { style.dashes }),
-            ),
+            Self::Path(style) => group.add(style.stroke(&[left, right])),
             Self::Ellipse => group.add(paint::ellipse(middle, [11.0, 5.5], 0.0)),
             Self::Field(ramp) => (0..6).fold(group, |group, k| {
                 let colour = ramp.colour(ramp.low + f64::from(k) / 5.0 * (ramp.high - ramp.low)).0;
-                group.add(rectangle(x + 1.0 + 4.0 * f64::from(k), y - 6.0, 4.3, 12.0).set("fill", colour))
+                let left = x + 1.0 + 4.0 * f64::from(k);
+                group.add(rectangle([left, y - 6.0, left + 4.3, y + 6.0]).set("fill", colour))
             }),
             Self::Arrow => group.add(paint::arrow(left, 26.0, 0.0, INK, 1.2)),
             Self::Spot(colour) => group.add(circle(middle, 5.0).set("fill", *colour)),

@@ -28,12 +28,13 @@ mod scenery;
 
 use svg::node::element::Group;
 
+use crate::draw::shapes::{INK, page, px, rectangle, text};
 use crate::geometry::{Pose, Vector2, atan2};
 use crate::world::World;
 use frame::Frame;
 use labels::Labels;
 use legend::{Legend, Swatch};
-use paint::{ellipse, polyline, px};
+use paint::{ellipse, polyline};
 
 /// Width of a drawing, px.
 pub const WIDTH_PX: f64 = 900.0;
@@ -56,6 +57,14 @@ impl PathStyle {
     pub const ESTIMATE: Self = Self { colour: "#d55e00", width_px: 1.6, dashes: "5 3" };
     /// The path by wheel odometry alone.
     pub const ODOMETRY: Self = Self { colour: "#009e73", width_px: 1.4, dashes: "2 3" };
+
+    /// A line through points of the page.
+    fn stroke(&self, corners: &[Vector2<f64>]) -> svg::node::element::Polyline {
+        polyline(corners)
+            .set("stroke", self.colour)
+            .set("stroke-width", px(self.width_px))
+            .set("stroke-dasharray", if self.dashes.is_empty() { "none" } else { self.dashes })
+    }
 }
 
 /// A map that is being drawn: the world, and layers added one by one.
@@ -127,11 +136,7 @@ impl MapDrawing {
         }
         pieces.push(piece);
         for piece in pieces.iter().filter(|piece| piece.len() > 1) {
-            let line = polyline(piece)
-                .set("stroke", style.colour)
-                .set("stroke-width", px(style.width_px))
-                .set("stroke-dasharray", if style.dashes.is_empty() { "none" } else { style.dashes });
-            self.paths = self.paths.add(line);
+            self.paths = self.paths.add(style.stroke(piece));
         }
         self.legend.add(Swatch::Path(*style), label);
         self
@@ -153,21 +158,20 @@ impl MapDrawing {
 
     /// Marks where a run started: the robot's outline and heading.
     #[must_use]
-    pub fn start(mut self, pose: &Pose) -> Self {
-        let at = self.frame.at(pose.position());
-        let robot = paint::robot(at, self.robot_radius_m * self.frame.px_per_m, pose.heading, paint::INK, paint::INK);
-        self.markers = self.markers.add(robot);
-        self.legend.add(Swatch::Robot(paint::INK), "start of the run");
-        self
+    pub fn start(self, pose: &Pose) -> Self {
+        self.robot(pose, INK, INK, "start of the run")
     }
 
     /// Marks where a run ended: the robot's outline and heading.
     #[must_use]
-    pub fn end(mut self, pose: &Pose) -> Self {
-        let at = self.frame.at(pose.position());
-        let robot = paint::robot(at, self.robot_radius_m * self.frame.px_per_m, pose.heading, paint::END, "#ffffff");
-        self.markers = self.markers.add(robot);
-        self.legend.add(Swatch::Robot(paint::END), "end of the run");
+    pub fn end(self, pose: &Pose) -> Self {
+        self.robot(pose, paint::END, "#ffffff", "end of the run")
+    }
+
+    fn robot(mut self, pose: &Pose, colour: &'static str, middle: &str, label: &str) -> Self {
+        let (at, radius) = (self.frame.at(pose.position()), self.robot_radius_m * self.frame.px_per_m);
+        self.markers = self.markers.add(paint::robot(at, radius, pose.heading, colour, middle));
+        self.legend.add(Swatch::Robot(colour), label);
         self
     }
 
@@ -188,14 +192,10 @@ impl MapDrawing {
             .add(self.markers.clone())
             .add(self.labels.draw())
             .add(self.frame.draw_axes());
-        let mut document = svg::Document::new()
-            .set("viewBox", (0, 0, WIDTH_PX, legend.bottom_px))
-            .set("width", px(WIDTH_PX))
-            .set("height", px(legend.bottom_px))
-            .set("font-family", "Helvetica, Arial, 'Liberation Sans', 'DejaVu Sans', sans-serif")
-            .add(paint::rectangle(0.0, 0.0, WIDTH_PX, legend.bottom_px).set("fill", "#ffffff"));
+        let white = rectangle([0.0, 0.0, WIDTH_PX, legend.bottom_px]).set("fill", "#ffffff");
+        let mut document = page(WIDTH_PX, legend.bottom_px).add(white);
         if let Some(title) = &self.title {
-            let text = paint::text(title, frame::LEFT_PX, 26.0, 16.0).set("font-weight", "bold").set("fill", paint::INK);
+            let text = text(title, frame::LEFT_PX, 26.0, 16.0).set("font-weight", "bold").set("fill", INK);
             document = document.add(text);
         }
         document.add(map).add(legend.group).to_string() + "\n"

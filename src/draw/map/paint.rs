@@ -1,13 +1,13 @@
-//! Colours and small shapes, in pixels.
+//! Colours and small shapes of maps, in pixels.
 
-use svg::node::element::{Circle, Ellipse, Group, Line, Path, Polygon, Polyline, Rectangle, Text};
+use svg::node::element::{Ellipse, Group, Path, Polygon, Polyline};
 
+pub(crate) use crate::draw::shapes::INK;
+pub(super) use crate::draw::shapes::circle;
+use crate::draw::shapes::px;
+use crate::draw::shapes::{self, blend, line, points};
 use crate::geometry::{Vector2, direction};
 
-/// Text and lines in front.
-pub(crate) const INK: &str = "#1a1a1a";
-/// Text and lines behind.
-pub(super) const FAINT_INK: &str = "#6b6b6b";
 /// Home.
 pub(crate) const HOME: &str = "#c0143c";
 /// End of a run.
@@ -46,52 +46,16 @@ pub(crate) fn friction_colour(friction: f64) -> String {
         (0.75, [238.0, 240.0, 234.0]),
         (1.2, [228.0, 209.0, 168.0]),
     ];
-    let after = RAMP.iter().position(|(mu, _)| *mu >= friction).unwrap_or(RAMP.len() - 1).max(1);
-    let ((low, from), (high, to)) = (RAMP[after - 1], RAMP[after]);
-    let t = ((friction - low) / (high - low)).clamp(0.0, 1.0);
-    let [r, g, b] = [0, 1, 2].map(|k| (from[k] + t * (to[k] - from[k])).round() as u8);
-    format!("#{r:02x}{g:02x}{b:02x}")
-}
-
-/// A length with two decimals, without a needless tail.
-pub(super) fn px(value: f64) -> String {
-    let text = format!("{value:.2}");
-    let text = text.trim_end_matches('0').trim_end_matches('.');
-    if text == "-0" { "0".to_owned() } else { text.to_owned() }
-}
-
-fn points(points: &[Vector2<f64>]) -> String {
-    points.iter().map(|p| format!("{},{}", px(p.x), px(p.y))).collect::<Vec<_>>().join(" ")
+    blend(&RAMP, friction)
 }
 
 pub(super) fn polygon(corners: &[Vector2<f64>]) -> Polygon {
-    Polygon::new().set("points", points(corners)).set("stroke-linejoin", "round")
+    Polygon::new().set("points", points(corners.iter().copied())).set("stroke-linejoin", "round")
 }
 
-/// An open line without filling.
+/// An open line without filling, with round ends.
 pub(super) fn polyline(corners: &[Vector2<f64>]) -> Polyline {
-    Polyline::new()
-        .set("points", points(corners))
-        .set("fill", "none")
-        .set("stroke-linejoin", "round")
-        .set("stroke-linecap", "round")
-}
-
-pub(super) fn line(a: Vector2<f64>, b: Vector2<f64>) -> Line {
-    Line::new().set("x1", px(a.x)).set("y1", px(a.y)).set("x2", px(b.x)).set("y2", px(b.y))
-}
-
-pub(super) fn circle(centre: Vector2<f64>, radius: f64) -> Circle {
-    Circle::new().set("cx", px(centre.x)).set("cy", px(centre.y)).set("r", px(radius))
-}
-
-pub(super) fn rectangle(x: f64, y: f64, width: f64, height: f64) -> Rectangle {
-    Rectangle::new().set("x", px(x)).set("y", px(y)).set("width", px(width)).set("height", px(height))
-}
-
-/// Text from its left end on its baseline.
-pub(super) fn text(content: &str, x: f64, y: f64, size: f64) -> Text {
-    Text::new(content).set("x", px(x)).set("y", px(y)).set("font-size", px(size))
+    shapes::polyline(corners.iter().copied()).set("stroke-linecap", "round")
 }
 
 /// An ellipse of an estimate; `angle_rad` is anti-clockwise in the room, whose y points up.
