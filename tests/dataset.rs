@@ -20,8 +20,9 @@ use wayhome::panorama::Panorama;
 use wayhome::panorama_set::{LayoutKind, PanoramaSet, Place};
 use wayhome::render::{CpuRenderer, Renderer, Scene, View};
 use wayhome::report::dataset::card;
-use wayhome::sensor::DatasetChoice;
+use wayhome::sensor::{DatasetChoice, DatasetField, DatasetSensor, Sensor};
 use wayhome::table::{Cells, Table};
+use wayhome::vision::ExtractorSettings;
 use wayhome::world::World;
 
 /// Width of the small panoramas here.
@@ -400,6 +401,158 @@ fn the_table_of_an_image_database_wins() {
     table("X [mm], Y [mm], Z [mm], Heading [degrees], Filename\n1, 2, 3, 4, c.png\n");
     let error = open().unwrap_err().to_string();
     assert!(error.contains("line 2: found `c.png`"), "{error}");
+}
+
+/// A picture of one colour in each file, and a table that has the places `(0, 0)` to `(0, n - 1)` and home's heading.
+fn image_database(folder: &Path, names: &[&str]) {
+    let mut table = "X [mm], Y [mm], Z [mm], Heading [degrees], Filename, Grid X, Grid Y, Grid Z\n".to_owned();
+    for (k, name) in (0_u8..).zip(names) {
+        image::RgbImage::from_pixel(64, 16, image::Rgb([k, 2, 3])).save(folder.join(name)).unwrap();
+        table += &format!("{}, 0, 0, 0, {name}, {k}, 0, 0\n", 100 * u32::from(k));
+    }
+    std::fs::write(folder.join("database_entries.csv"), table).unwrap();
+}
+
+#[test]
+fn home_is_where_it_is_told_to_be() {
+    let world = World::open("lab").unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    image_database(folder.path(), &["a.png", "b.png", "c.png", "d.png"]);
+    let choice = |home| DatasetChoice { folder: folder.path().to_owned(), home, ..DatasetChoice::default() };
+    let red_at_home = |home| {
+        let field = DatasetField::new(&world, &choice(home))?;
+        let sensor = DatasetSensor::new(&world, field.into(), ExtractorSettings::default());
+        Ok::<u8, Error>(sensor.home_panorama().unwrap().rgba[0])
+    };
+    assert_eq!(red_at_home(Some(Place { i: 0, j: 2 })).unwrap(), 2);
+    assert_eq!(red_at_home(None).unwrap(), 1, "the middle");
+    assert!(red_at_home(Some(Place { i: 0, j: 4 })).unwrap_err().to_string().contains("none at place (0, 4)"));
+    let table = "X [mm], Y [mm], Z [mm], Heading [degrees], Filename\n0, 0, 0, 0, b.png\n9, 0, 0, 0, c.png\n";
+    std::fs::write(folder.path().join("database_entries.csv"), table).unwrap();
+    assert_eq!(red_at_home(None).unwrap(), 1, "the first");
+    let error = red_at_home(Some(Place { i: 0, j: 1 })).unwrap_err().to_string();
+    assert!(error.contains("--dataset-home") && error.contains("places of a grid"), "{error}");
+}
+
+/// A robot that starts where no panorama is near is told of, not left to stand without a word.
+#[test]
+fn a_start_outside_a_set_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let plan = Plan::new(
+        &World::open("lab").unwrap(),
+        Request {
+            places: Places::Grid { columns: 3, rows: 2, spacing_m: 0.3, origin_m: None },
+            conditions: vec![Condition::original()],
+            ..request(LayoutKind::Folder)
+        },
+    )
+    .unwrap();
+    let set = folder.path().join("set");
+    make(&plan, &set, (1, 1)).unwrap();
+    let set = set.display().to_string();
+    let out = folder.path().join("run").display().to_string();
+    let home = ["home", "lab", "--bearings", "dataset", "--dataset", &set, "--seed", "1", "--out", &out, "--time-limit-s", "1"];
+    let told = |start: &str| {
+        let output = run(&[&home[..], &["--start", start]].concat());
+        String::from_utf8_lossy(&output.stderr).matches("outside the set").count()
+    };
+    assert_eq!((told("6.2,0.8,0"), told("3.5,3,0")), (1, 0), "once, and only there");
+}
+
+/// What a stranger's set may not do: ask for more than a set of this program does, or lead out of its folder.
+#[test]
+fn sets_of_strangers_are_held_to_their_bounds() {
+    let base = tempfile::tempdir().unwrap();
+    let set = base.path().join("set");
+    let places = Places::Grid { columns: 2, rows: 2, spacing_m: 0.3, origin_m: None };
+    let small =
+        Request { places, conditions: vec![Condition::original()], size_px: Some((64, 8)), ..request(LayoutKind::Vardy) };
+    make(&Plan::new(&World::open("lab").unwrap(), small).unwrap(), &set, (1, 1)).unwrap();
+    let refused = |folder: &Path, words: &[&str]| {
+        let error = PanoramaSet::open(folder).and_then(|set| set.load(0)).map(|_| ()).unwrap_err().to_string();
+        assert!(words.iter().all(|word| error.contains(word)), "{words:?} are not in: {error}");
+    };
+    // Its document.
+    let document = set.join("dataset.json");
+    let written = std::fs::read(&document).unwrap();
+    for (place, value) in [
+        ("/grid/rows", serde_json::json!(0)),
+        ("/grid/rows", serde_json::json!(1_000_000_000_000_000_000_u64)),
+        ("/grid/columns", serde_json::json!(u64::MAX)),
+        ("/grid/spacing_m", serde_json::json!(0.0)),
+        ("/grid/spacing_m", serde_json::json!(-0.3)),
+        ("/grid/first_m/0", serde_json::json!(1e300)),
+        ("/grid/home", serde_json::json!([1_000_000_000_000_000_000_u64, 0])),
+        ("/home/x_m", serde_json::json!(1e18)),
+        ("/projection/horizon_row", serde_json::json!(1e300)),
+        ("/projection/width", serde_json::json!(0)),
+        ("/conditions/0/name", serde_json::json!("../original")),
+        ("/parts", serde_json::json!(1_000_000_000_000_000_000_u64)),
+        ("/layout", serde_json::json!("kitti")),
+    ] {
+        let mut told: serde_json::Value = serde_json::from_slice(&written).unwrap();
+        *told.pointer_mut(place).unwrap() = value;
+        std::fs::write(&document, told.to_string()).unwrap();
+        let name = place.trim_start_matches('/').split('/').next().unwrap();
+        refused(&set, &["dataset.json", name, "allowed is"]);
+    }
+    std::fs::write(&document, &written).unwrap();
+    // A place that the grid does not have, a picture that is too large, one that is cut off.
+    let extra = set.join("original/99_0.pgm");
+    std::fs::write(&extra, "").unwrap();
+    refused(&set, &["99_0.pgm", "(99, 0)"]);
+    std::fs::remove_file(&extra).unwrap();
+    std::fs::write(set.join("original/0_0.pgm"), "P5\n16384 16384\n255\n").unwrap();
+    refused(&set, &["0_0.pgm", "16384 x 16384 pixels"]);
+    let far = base.path().join("far");
+    pgm(&far, "0_0.pgm", 8, 3);
+    pgm(&far, "18446744073709551615_5.pgm", 8, 3);
+    refused(&far, &["places, expected at most"]);
+    let photographs = base.path().join("photographs");
+    std::fs::create_dir(&photographs).unwrap();
+    image_database(&photographs, &["a.jpg"]);
+    assert!(PanoramaSet::open(&photographs).unwrap().load(0).is_ok());
+    let whole = std::fs::read(photographs.join("a.jpg")).unwrap();
+    std::fs::write(photographs.join("a.jpg"), &whole[..whole.len() - 8]).unwrap();
+    refused(&photographs, &["a.jpg", "cut off"]);
+    // Moeller's line.
+    let moeller = base.path().join("moeller");
+    pgm(&moeller.join("DATA2/hall1day8"), "cv_0_0_bw0.10.pgm", 8, 3);
+    for line in [
+        "8 0 0 0 0 1e3 1",
+        "8 0 0 0 0 1e300 1",
+        "8 0 0 0 0 0 1",
+        "8 0 0 0 0 0.1 1e300",
+        "8 0 1e300 0 0 0.1 1",
+        "8 0 0 0 0 nan 1",
+    ] {
+        std::fs::write(moeller.join("DATA2/hall1_8.db"), line).unwrap();
+        refused(&moeller, &["hall1_8.db", "line 1", "vertRes"]);
+    }
+    // Ways out of the folder, and files that never end.
+    let checked = || check(&set, &|_, _| ControlFlow::Continue(())).map(|_| ()).unwrap_err().to_string();
+    let sums = std::fs::read_to_string(set.join("SHA256SUMS")).unwrap();
+    let outside = photographs.join("a.jpg").display().to_string();
+    for path in [outside.as_str(), "../photographs/a.jpg"] {
+        std::fs::write(set.join("SHA256SUMS"), format!("{sums}{}  {path}\n", "0".repeat(64))).unwrap();
+        let error = checked();
+        assert!(error.contains("a.jpg") && error.contains("expected a plain file in"), "{error}");
+    }
+    #[cfg(unix)]
+    {
+        std::fs::write(set.join("SHA256SUMS"), sums).unwrap();
+        let picture = set.join("original/0_0.pgm");
+        for target in [outside.as_str(), "/dev/zero"] {
+            std::fs::remove_file(&picture).unwrap();
+            std::os::unix::fs::symlink(target, &picture).unwrap();
+            refused(&set, &["0_0.pgm", "expected a plain file in"]);
+            assert!(checked().contains("0_0.pgm"));
+        }
+        std::fs::remove_file(&picture).unwrap();
+        assert!(Command::new("mkfifo").arg(&picture).status().unwrap().success());
+        refused(&set, &["0_0.pgm", "a pipe or a device"]);
+        assert!(checked().contains("0_0.pgm"));
+    }
 }
 
 /// A robot that only has a set of panoramas comes home, whatever the layout, also where the set tells nothing but its pictures.

@@ -101,7 +101,7 @@ pub struct SetupArgs {
     /// Distance between places of a set that does not tell it, m
     #[arg(long, value_name = "S", requires = "dataset", allow_negative_numbers = true, value_parser = positive)]
     pub dataset_spacing_m: Option<f64>,
-    /// Row and column of home, from 0, of a set that does not tell it [default: the middle]
+    /// Row and column of home, from 0, of a set that does not tell it [default: the middle; without a grid, the first panorama]
     #[arg(long, value_name = "I,J", requires = "dataset", value_parser = place)]
     pub dataset_home: Option<Place>,
     /// Standard deviation of noisy bearings, degrees [default: 0.3]

@@ -173,17 +173,21 @@ impl PanoramaSet {
         }
     }
 
-    /// The grid about home, for a set on a grid; `spacing_m` and `home` are for sets that do not tell. Without a home the middle
-    /// is taken.
+    /// The grid about home, for a set on a grid; `spacing_m` and `home` are for sets that do not tell.
     #[must_use]
     pub fn grid(&self, spacing_m: Option<f64>, home: Option<Place>) -> Option<Grid> {
         let (rows, columns) = self.shape();
         let told = self.document.as_ref().and_then(|d| d.grid.as_ref());
-        let spacing_m = spacing_m.or(told.map(|g| g.spacing_m))?;
-        let told_home = told.and_then(|g| g.home).map(|[i, j]| Place { i, j });
-        let middle = Place { i: rows.saturating_sub(1) / 2, j: columns.saturating_sub(1) / 2 };
-        let home = home.or(told_home).unwrap_or(middle);
-        (rows > 0 && columns > 0).then_some(Grid { rows, columns, spacing_m, home })
+        Some(Grid { rows, columns, spacing_m: spacing_m.or(told.map(|g| g.spacing_m))?, home: self.home_place(home)? })
+    }
+
+    /// The place of home: `asked`, else what the set tells, else the middle of its grid; `None` for a set without places.
+    #[must_use]
+    pub fn home_place(&self, asked: Option<Place>) -> Option<Place> {
+        let (rows, columns) = self.shape();
+        let told = || self.document.as_ref()?.grid.as_ref()?.home.map(|[i, j]| Place { i, j });
+        let middle = || Place { i: (rows - 1) / 2, j: (columns - 1) / 2 };
+        (rows > 0 && columns > 0).then(|| asked.or_else(told).unwrap_or_else(middle))
     }
 
     /// The panorama of a place, of the first condition that has it.

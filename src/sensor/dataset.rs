@@ -29,7 +29,7 @@ pub struct DatasetChoice {
     pub home_condition: Option<String>,
     /// Distance between places of its grid, m.
     pub spacing_m: Option<f64>,
-    /// Place at home; by default the middle of the grid.
+    /// Place at home; by default the middle of the grid, and the first panorama of a set without one.
     pub home: Option<Place>,
 }
 
@@ -40,7 +40,7 @@ pub struct DatasetField {
     /// Where the camera was when each panorama was taken, in the room.
     poses: Vec<Pose>,
     /// The grid, its frame in the room, and which panorama is at each of its places.
-    grid: Option<(Grid, Pose, Vec<Option<usize>>)>,
+    grid: Option<(Grid, Pose, BTreeMap<Place, usize>)>,
     home: Panorama,
     home_heading: f64,
 }
@@ -78,7 +78,9 @@ impl DatasetField {
         let all = |set: &PanoramaSet| (0..set.entries().len()).map(|k| pose_of(set, k)).collect::<Option<Vec<_>>>();
         let own = all(&set).ok_or_else(untold)?;
         let own_at_home = all(&at_home).ok_or_else(untold)?;
-        let home_place = grid.as_ref().map(|g| g.home);
+        let home_place = at_home.home_place(choice.home);
+        let place_of = |k: usize| at_home.entries()[k].place;
+        let named = |place: Option<Place>| place.map_or("none".to_owned(), |Place { i, j }| format!("({i}, {j})"));
         let home = if in_room {
             let off = |k: &usize| (own_at_home[*k].position() - world.home.position()).norm();
             let nearest = (0..own_at_home.len()).min_by(|a, b| off(a).total_cmp(&off(b))).ok_or_else(untold)?;
@@ -92,13 +94,27 @@ impl DatasetField {
                 let allowed = format!("a panorama within {most} m of the home of `{}`", world.spec.name);
                 return Err(invalid("home panorama", found, &allowed));
             }
+            if choice.home.is_some() && choice.home != place_of(nearest) {
+                let allowed = format!("{}, where the set has its home", named(place_of(nearest)));
+                return Err(invalid("--dataset-home", named(choice.home), &allowed));
+            }
             nearest
         } else {
-            let place = |k: &usize| home_place.is_none() || at_home.entries()[*k].place == home_place;
-            (0..own_at_home.len()).find(place).ok_or_else(|| {
-                let Place { i, j } = home_place.unwrap_or(Place { i: 0, j: 0 });
-                invalid("home panorama", format!("none at place ({i}, {j})"), "a place with a panorama; see --dataset-home")
-            })?
+            if choice.home.is_some() && home_place.is_none() {
+                return Err(invalid("--dataset-home", named(choice.home), "a set whose panoramas have places of a grid"));
+            }
+            let found = (0..own_at_home.len()).find(|k| home_place.is_none() || place_of(*k) == home_place);
+            let found = found.ok_or_else(|| {
+                let found = format!("none at place {}", named(home_place));
+                invalid("home panorama", found, "a place with a panorama; see --dataset-home")
+            })?;
+            if choice.home.is_none() {
+                let (folder, picture) = (choice.folder.display(), at_home.entries()[found].path().display());
+                log::warn!(
+                    "{folder}: the set does not say where home is; it is taken to be at `{picture}`, see --dataset-home"
+                );
+            }
+            found
         };
         let origin = own_at_home[home];
         // Our own sets tell where the robot stood, others where the camera did.
@@ -106,19 +122,17 @@ impl DatasetField {
         let lay = |pose: Pose| if in_room { world.camera_pose(&pose) } else { camera_home.compose(&origin.to_local(&pose)) };
         let poses: Vec<Pose> = own.into_iter().map(lay).collect();
         let grid = grid.filter(|_| set.entries().iter().all(|e| e.place.is_some())).map(|grid| {
-            let mut held = vec![None; grid.rows * grid.columns];
+            let mut held = BTreeMap::new();
             for (k, entry) in set.entries().iter().enumerate() {
-                if let Some(slot) = entry.place.and_then(|place| held.get_mut(grid.index(place))) {
-                    *slot = slot.or(Some(k));
+                if let Some(place) = entry.place {
+                    held.entry(place).or_insert(k);
                 }
             }
             // Our grids lie along the room's axes, those of others along the heading at home.
-            let at = set.document().and_then(|d| d.grid.as_ref()).map(|g| {
-                let s = g.spacing_m;
-                let robot =
-                    Pose::new(g.first_m[0] + grid.home.j as f64 * s, g.first_m[1] - grid.home.i as f64 * s, origin.heading);
-                Pose { heading: 0.0, ..world.camera_pose(&robot) }
-            });
+            let at = set
+                .document()
+                .and_then(|d| d.grid.as_ref())
+                .map(|g| Pose { heading: 0.0, ..world.camera_pose(&g.pose(grid.home, origin.heading)) });
             (grid, at.unwrap_or(camera_home), held)
         });
         let home_heading = lay(origin).heading;
@@ -142,6 +156,8 @@ pub struct DatasetSensor {
     /// The camera on the robot.
     mount: Pose,
     timing: SensorTiming,
+    /// Whether it was told in this run that the robot is outside the set.
+    told: bool,
 }
 
 impl DatasetSensor {
@@ -156,7 +172,7 @@ impl DatasetSensor {
             bearing.azimuth_rad = wrap(bearing.azimuth_rad + turn);
         }
         let mount = world.camera_pose(&Pose::IDENTITY);
-        Self { field, extractor, home, seen: BTreeMap::new(), last: None, mount, timing: SensorTiming::default() }
+        Self { field, extractor, home, seen: BTreeMap::new(), last: None, mount, timing: SensorTiming::default(), told: false }
     }
 
     /// Bearings of panorama `k`, azimuths in the room.
@@ -197,9 +213,30 @@ impl DatasetSensor {
     }
 }
 
+impl DatasetSensor {
+    /// Tells once a run why there are no bearings.
+    fn tell_outside(&mut self, camera: Pose, grid: &Grid, frame: &Pose) {
+        if std::mem::replace(&mut self.told, true) {
+            return;
+        }
+        let corner = |i: usize, j: usize| {
+            let at = frame.transform(grid.position(Place { i, j }));
+            format!("({:.2}, {:.2})", at.x, at.y)
+        };
+        log::warn!(
+            "no bearings where the camera is, at ({:.2}, {:.2}) m: it is outside the set in {}, whose grid reaches from {} to {} m",
+            camera.x,
+            camera.y,
+            self.field.set.folder().display(),
+            corner(grid.rows - 1, 0),
+            corner(0, grid.columns - 1)
+        );
+    }
+}
+
 impl Sensor for DatasetSensor {
     fn reset(&mut self, _seed: Seed) -> Result<()> {
-        (self.last, self.timing) = (None, SensorTiming::default());
+        (self.last, self.timing, self.told) = (None, SensorTiming::default(), false);
         Ok(())
     }
 
@@ -215,8 +252,11 @@ impl Sensor for DatasetSensor {
             && grid.rows > 1
             && grid.columns > 1
         {
-            let Some(cell) = grid.cell(frame.inverse_transform(camera.position())) else { return Ok(Vec::new()) };
-            let around = cell.corners.iter().zip(cell.weights).map(|(place, weight)| Some((held[grid.index(*place)]?, weight)));
+            let Some(cell) = grid.cell(frame.inverse_transform(camera.position())) else {
+                self.tell_outside(camera, grid, frame);
+                return Ok(Vec::new());
+            };
+            let around = cell.corners.iter().zip(cell.weights).map(|(place, weight)| Some((*held.get(place)?, weight)));
             corners = around.collect::<Option<Vec<_>>>().unwrap_or_default();
         }
         if corners.is_empty() {
