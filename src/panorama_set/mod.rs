@@ -8,17 +8,6 @@
 //! Sets may come from anyone: only plain files inside their folder are opened, links resolved, and no number of theirs asks for more
 //! memory than a set of this program does.
 //!
-//! | layout | pictures | columns | rows |
-//! |---|---|---|---|
-//! | `vardy` | `CONDITION/I_J.pgm`, grey | azimuth falls | even in elevation, horizon in the middle |
-//! | `moeller` | `DATA2/BASE_SUFFIX.db`, `DATA2/BASECONDITIONSUFFIX/cv_X_Y_bwBW.pgm`, grey, X counts backwards | azimuth falls | even in elevation, horizon as the `.db` says |
-//! | `image-database` | `CONDITION/database_entries.csv`, `database_metadata.yaml`, PNG | azimuth grows | even in its tangent |
-//! | `webdataset` | `shards/CONDITION-N.tar` with `KEY.rgb.png`, `.range.png`, `.instance.png`, `.json` | azimuth grows | even in its tangent |
-//! | `folder` | `CONDITION/N.rgb.png`, `.range.png`, `.instance.png`, `.json` | azimuth grows | even in its tangent |
-//! | `paper` (read only) | `I_J.png` or `.pgm` | azimuth grows | even in its tangent |
-//!
-//! The first three have no place for range and instances; they lie in `truth/CONDITION/`, where no reader of the layout looks.
-//!
 //! Whatever a set's own sense of azimuth, [`PanoramaSet::load`] gives a [`Panorama`](crate::panorama::Panorama) whose columns run
 //! anti-clockwise. A [`Grid`] says where the places of a set lie about its home.
 //!

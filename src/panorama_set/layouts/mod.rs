@@ -1,4 +1,15 @@
 //! The list of layouts. A new one is a file here, a line of [`LayoutKind`] and one of [`LayoutKind::layout`].
+//!
+//! | layout | pictures | columns | rows |
+//! |---|---|---|---|
+//! | `vardy` | `CONDITION/I_J.pgm`, grey | azimuth falls | even in elevation, horizon in the middle |
+//! | `moeller` | `DATA2/BASE_SUFFIX.db`, `DATA2/BASECONDITIONSUFFIX/cv_X_Y_bwBW.pgm`, grey, X counts backwards | azimuth falls | even in elevation, horizon as the `.db` says |
+//! | `image-database` | `CONDITION/database_entries.csv`, `database_metadata.yaml`, PNG | azimuth grows | even in its tangent |
+//! | `webdataset` | `shards/CONDITION-N.tar` with `KEY.rgb.png`, `.range.png`, `.instance.png`, `.json` | azimuth grows | even in its tangent |
+//! | `folder` | `CONDITION/N.rgb.png`, `.range.png`, `.instance.png`, `.json` | azimuth grows | even in its tangent |
+//! | `paper` (read only) | `I_J.png` or `.pgm` | azimuth grows | even in its tangent |
+//!
+//! Where a layout has no place for range and instances, they lie in `truth/CONDITION/`, where none of its readers looks.
 
 mod folder;
 mod image_database;
