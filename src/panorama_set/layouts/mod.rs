@@ -5,6 +5,7 @@
 //! | `vardy` | `CONDITION/I_J.pgm`, grey | azimuth falls | even in elevation, horizon in the middle |
 //! | `moeller` | `DATA2/BASE_SUFFIX.db`, `DATA2/BASECONDITIONSUFFIX/cv_X_Y_bwBW.pgm`, grey, X counts backwards | azimuth falls | even in elevation, horizon as the `.db` says |
 //! | `image-database` | `CONDITION/database_entries.csv`, `database_metadata.yaml`, PNG | azimuth grows | even in its tangent |
+//! | `image-folder` | `CONDITION/N.png`, `metadata.jsonl` | azimuth grows | even in its tangent |
 //! | `webdataset` | `shards/CONDITION-N.tar` with `KEY.rgb.png`, `.range.png`, `.instance.png`, `.json` | azimuth grows | even in its tangent |
 //! | `folder` | `CONDITION/N.rgb.png`, `.range.png`, `.instance.png`, `.json` | azimuth grows | even in its tangent |
 //! | `paper` (read only) | `I_J.png` or `.pgm` | azimuth grows | even in its tangent |
@@ -13,6 +14,7 @@
 
 mod folder;
 mod image_database;
+mod image_folder;
 mod moeller;
 mod vardy;
 mod webdataset;
@@ -29,6 +31,8 @@ use super::layout::Layout;
 pub enum LayoutKind {
     /// BrainsOnBoard: database_entries.csv, database_metadata.yaml, PNG.
     ImageDatabase,
+    /// ImageFolder, as Hugging Face's `datasets` loads it: CONDITION/N.png and metadata.jsonl.
+    ImageFolder,
     /// Moeller's: a .db line about the grid, and folders with cv_X_Y_bwBW.pgm, grey, clockwise.
     Moeller,
     /// Tar shards for training with `webdataset`.
@@ -49,6 +53,7 @@ impl LayoutKind {
     pub fn layout(self) -> &'static dyn Layout {
         match self {
             Self::ImageDatabase => &image_database::ImageDatabase,
+            Self::ImageFolder => &image_folder::ImageFolder,
             Self::Moeller => &moeller::Moeller,
             Self::Webdataset => &webdataset::Webdataset,
             Self::Vardy => &vardy::VARDY,
