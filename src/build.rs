@@ -2,7 +2,6 @@
 //!
 //! The commit is asked of git where the package is the top of a checkout, and read from the note that `cargo package` leaves in
 //! a published package. Without either the version stands alone. The script runs again when the commit or the sources change.
-#![expect(clippy::print_stdout, reason = "cargo reads what a build script prints")]
 
 use std::path::Path;
 use std::process::Command;
