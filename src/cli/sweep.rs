@@ -12,7 +12,7 @@ use wayhome::Error;
 use wayhome::report::sweep as page;
 use wayhome::study::statistics::wilson_95;
 use wayhome::study::sweep::store::{Rate, StudyFolder};
-use wayhome::study::sweep::{Row, Study, catalogue, run as run_chunks};
+use wayhome::study::sweep::{Row, Setting, Study, catalogue, run as run_chunks};
 
 use super::context::{Context, Verdict, folder_or, print};
 use super::values::{seeds, shard};
@@ -124,8 +124,9 @@ pub fn run(args: &SweepArgs, context: &Context) -> Result<Verdict> {
         (None, Some(study)) => sweep(args, study, context),
         (None, None) => {
             let mut text = String::new();
-            for (name, words) in catalogue() {
-                let _ = writeln!(text, "{}", format!("{name:<28} {words}").trim_end());
+            for Setting { key, unit, default, meaning } in catalogue() {
+                let default = if default.is_empty() { String::new() } else { format!("[{default}] ") };
+                let _ = writeln!(text, "{}", format!("{key:<40} {unit:<9} {default}{meaning}").trim_end());
             }
             print(&text)?;
             Ok(Verdict::Done)

@@ -38,7 +38,9 @@ use objects::{Found, Objects, Place};
 use pyramid::Pyramid;
 
 /// What a landmark is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, EnumMessage, IntoStaticStr, VariantArray)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema, EnumMessage, IntoStaticStr, VariantArray,
+)]
 #[serde(rename_all = "kebab-case")]
 #[strum(serialize_all = "kebab-case")]
 pub enum Landmarks {
@@ -49,7 +51,7 @@ pub enum Landmarks {
 }
 
 /// Settings of the extractor. The defaults suit 1440 x 180 pixels.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct ExtractorSettings {
     /// Octaves of the scale space; fewer are built where the panorama is too small.

@@ -82,12 +82,6 @@ impl World {
         schemars::schema_for!(WorldSpec).to_value()
     }
 
-    /// Places of all fields of a world file: `floor.friction`, `obstacles[].height_m`.
-    #[must_use]
-    pub fn field_names() -> Vec<String> {
-        structure::places(&Self::json_schema())
-    }
-
     /// Checks a world given as TOML text. `source` names it in messages; images are looked for in its folder.
     ///
     /// # Errors

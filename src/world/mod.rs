@@ -32,6 +32,7 @@ pub use light::LightPreset;
 pub use picture::Picture;
 pub use robot::RobotSpec;
 pub use spec::{MotionSpec, TaskSpec, TextureFamily, TextureSpec, WorldSpec};
+pub use structure::{Field, fields};
 pub use texture::{Pattern, Texture};
 pub use wall::{Partition, Piece};
 

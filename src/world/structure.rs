@@ -44,9 +44,21 @@ pub(super) fn check(file: &mut Node, schema: &Json) -> Findings {
     walk.findings
 }
 
-/// Places of all fields of the world format, in the order of the schema; `[]` stands for an entry of a list.
-pub(super) fn places(schema: &Json) -> Vec<String> {
-    fn walk(schema: &Json, definitions: Option<&Json>, place: &str, found: &mut Vec<String>) {
+/// A field of a format, as its JSON Schema has it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Field {
+    /// Its place: `floor.friction`, `obstacles[].height_m`.
+    pub place: String,
+    /// What it is without a value; empty where it must be given.
+    pub default: String,
+    /// What it means: the first sentence of its description.
+    pub meaning: String,
+}
+
+/// All fields of a format, in the order of its schema; `[]` stands for an entry of a list.
+#[must_use]
+pub fn fields(schema: &Json) -> Vec<Field> {
+    fn walk(schema: &Json, definitions: Option<&Json>, place: &str, found: &mut Vec<Field>) {
         let named = schema.get("$ref").and_then(Json::as_str).and_then(|r| r.strip_prefix("#/$defs/"));
         let schema = named.and_then(|name| definitions?.get(name)).unwrap_or(schema);
         for alternative in ["oneOf", "anyOf"].iter().filter_map(|key| schema.get(key)?.as_array()).flatten() {
@@ -54,7 +66,10 @@ pub(super) fn places(schema: &Json) -> Vec<String> {
         }
         for (key, field) in schema.get("properties").and_then(Json::as_object).into_iter().flatten() {
             let place = if place.is_empty() { key.clone() } else { format!("{place}.{key}") };
-            found.push(place.clone());
+            let description = field.get("description").and_then(Json::as_str).unwrap_or_default().replace('\n', " ");
+            let meaning = description.split(". ").next().unwrap_or_default().trim_end_matches('.').to_owned();
+            let default = field.get("default").map(plain).unwrap_or_default();
+            found.push(Field { place: place.clone(), default, meaning });
             walk(field, definitions, &place, found);
         }
         if let Some(item) = schema.get("items") {
@@ -64,6 +79,18 @@ pub(super) fn places(schema: &Json) -> Vec<String> {
     let mut found = Vec::new();
     walk(schema, schema.get("$defs"), "", &mut found);
     found
+}
+
+/// A value as people write it: a text without quotes, a number of single precision without the digits of double precision.
+fn plain(value: &Json) -> String {
+    match value {
+        Json::String(text) => text.clone(),
+        Json::Array(items) => format!("[{}]", items.iter().map(plain).collect::<Vec<_>>().join(", ")),
+        other => match other.as_f64() {
+            Some(number) if f64::from(number as f32) == number => (number as f32).to_string(),
+            _ => other.to_string(),
+        },
+    }
 }
 
 struct Walk<'s> {

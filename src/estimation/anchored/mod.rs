@@ -34,7 +34,7 @@ use motion::{LOOSENINGS, Motion, SlipWatch};
 use smoother::{Frame, Iterate, Sighting, Solution, Stretch};
 
 /// Knobs of the filter.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct FilterSettings {
     /// Mean of the prior on inverse range, 1/m.
@@ -68,9 +68,9 @@ pub struct FilterSettings {
     pub joint_gate: f64,
     /// Landmarks in the state at most.
     pub max_landmarks: usize,
-    /// Home is adopted once its position is known to this share of its distance...
+    /// Home is adopted once its position is known to this share of its distance, or to `adopt_sd_m`.
     pub adopt_sd_share: f64,
-    /// ... or to this, m.
+    /// Home is adopted once its position is known to this, m, or to `adopt_sd_share`.
     pub adopt_sd_m: f64,
     /// Rivals of the adopted hypothesis must be worse by this much (log likelihood).
     pub adopt_margin: f64,

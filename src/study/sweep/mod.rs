@@ -18,6 +18,6 @@ mod value;
 pub use design::{Design, SOBOL_AXES};
 pub use rows::Row;
 pub use run::{Failure, Store, replay, run};
-pub use settings::catalogue;
+pub use settings::{Setting, catalogue};
 pub use spec::{Axis, Chunk, Levels, MOST_EPISODES, Study};
 pub use value::Value;

@@ -7,6 +7,8 @@
 
 use serde::Serialize;
 use serde::de::DeserializeOwned;
+use strsim::levenshtein;
+use strum::VariantArray;
 
 use super::value::Value;
 use crate::control::Law;
@@ -17,7 +19,7 @@ use crate::method::MethodKind;
 use crate::render::RendererChoice;
 use crate::study::compare::{CONTENDERS, pick};
 use crate::vision::{ExtractorSettings, Landmarks};
-use crate::world::{CameraPreset, Draft, LightPreset, World};
+use crate::world::{CameraPreset, Draft, Field, LightPreset, WorldSpec, fields};
 
 /// Half the width of the ring that starts at a given distance are drawn from, m.
 pub const START_RING_M: f64 = 0.05;
@@ -35,27 +37,29 @@ pub struct Case {
 type Refusal = String;
 type Apply = fn(&mut Case, &Value) -> std::result::Result<(), Refusal>;
 
-/// Settings by name, all but those of `world.`, `filter.` and `extractor.`, with what they are.
-const SETTINGS: &[(&str, &str, Apply)] = &[
-    ("world", "world file or built-in world", |case, value| {
+/// Key, default, meaning and effect of each setting but those of `world.`, `filter.` and `extractor.`.
+const SETTINGS: &[(&str, &str, &str, Apply)] = &[
+    ("world", "the study's", "world file or built-in world", |case, value| {
         case.draft = Draft::open(text(value)?).map_err(|e| e.to_string())?;
         Ok(())
     }),
     // Before those that a method's name implies, so that what is said of them beside it holds.
-    ("method", "homing method, by its name in `wayhome compare`", |case, value| set_method(&mut case.setup, text(value)?)),
-    ("controller", "steering law", |case, value| choose(&mut case.setup.law, &[Law::Proportional, Law::Lyapunov], value)),
-    ("compass_deg", "standard deviation of the compass, degrees", |case, value| {
+    ("method", "anchored-ekf", "homing method, by its name in `wayhome compare`", |case, value| {
+        set_method(&mut case.setup, text(value)?)
+    }),
+    ("controller", "proportional", "steering law", |case, value| choose(&mut case.setup.law, Law::VARIANTS, value)),
+    ("compass_deg", "none", "standard deviation of the compass", |case, value| {
         case.setup.compass_sd_rad = Some(at_least_0(value)?.to_radians());
         Ok(())
     }),
-    ("plant", "what moves", |case, value| choose(&mut case.setup.plant, &[PlantKind::Rapier, PlantKind::Unicycle], value)),
-    ("bearings", "where bearings come from", |case, value| {
+    ("plant", "rapier", "what moves", |case, value| choose(&mut case.setup.plant, PlantKind::VARIANTS, value)),
+    ("bearings", "rendered", "where bearings come from", |case, value| {
         choose(&mut case.setup.sensor, &[SensorKind::Rendered, SensorKind::Ideal, SensorKind::Noisy], value)
     }),
-    ("landmarks", "what a landmark of rendered bearings is", |case, value| {
-        choose(&mut case.setup.extractor.landmarks, &[Landmarks::Features, Landmarks::Objects], value)
+    ("landmarks", "features", "what a landmark of rendered bearings is", |case, value| {
+        choose(&mut case.setup.extractor.landmarks, Landmarks::VARIANTS, value)
     }),
-    ("renderer", "what renders", |case, value| {
+    ("renderer", "cpu", "what renders", |case, value| {
         case.setup.renderer = match text(value)? {
             "cpu" => RendererChoice::Cpu,
             "gpu" => RendererChoice::Gpu,
@@ -63,66 +67,70 @@ const SETTINGS: &[(&str, &str, Apply)] = &[
         };
         Ok(())
     }),
-    ("size", "columns and rows of the panorama, \"720x90\"", |case, value| {
+    ("size", "the world's", "columns and rows of the panorama, \"720x90\"", |case, value| {
         let size = text(value)?.split_once('x').and_then(|(w, h)| Some((w.parse().ok()?, h.parse().ok()?)));
         let fits = |&(w, h): &(u32, u32)| (16..=16384).contains(&w) && (8..=4096).contains(&h);
         case.setup.size_px = Some(size.filter(fits).ok_or("a size from 16x8 to 16384x4096 pixels in quotes, as \"720x90\"")?);
         Ok(())
     }),
-    ("light", "light", |case, value| choose_one(&mut case.setup.look.light, &LightPreset::ALL, value)),
-    ("camera", "camera", |case, value| choose_one(&mut case.setup.look.camera, &CameraPreset::ALL, value)),
-    ("home_light", "light at home", |case, value| choose_one(&mut case.setup.home_look.light, &LightPreset::ALL, value)),
-    ("home_camera", "camera at home", |case, value| choose_one(&mut case.setup.home_look.camera, &CameraPreset::ALL, value)),
-    ("start", "random, or a start that the world names", |case, value| {
+    ("light", "the world's", "light", |case, value| choose_one(&mut case.setup.look.light, LightPreset::VARIANTS, value)),
+    ("camera", "the world's", "camera", |case, value| choose_one(&mut case.setup.look.camera, CameraPreset::VARIANTS, value)),
+    ("home_light", "as light", "light at home", |case, value| {
+        choose_one(&mut case.setup.home_look.light, LightPreset::VARIANTS, value)
+    }),
+    ("home_camera", "as camera", "camera at home", |case, value| {
+        choose_one(&mut case.setup.home_look.camera, CameraPreset::VARIANTS, value)
+    }),
+    ("start", "random", "random, or a start that the world names", |case, value| {
         let name = text(value)?;
         case.setup.start = if name == "random" { Start::Random } else { Start::Named(name.to_owned()) };
         Ok(())
     }),
-    ("start_distance_m", "distance of random starts from home, to 5 cm", |case, value| {
+    ("start_distance_m", "the world's", "distance of random starts from home, to 5 cm", |case, value| {
         let distance = at_least_0(value)?;
         put(case, "start.min_distance_m", &(distance - START_RING_M).max(0.0))?;
         put(case, "start.max_distance_m", &(distance + START_RING_M))
     }),
-    ("time_limit_s", "time limit, s", |case, value| {
+    ("time_limit_s", "the world's", "time limit", |case, value| {
         case.setup.time_limit_s = Some(at_least_0(value).ok().filter(|s| *s > 0.0).ok_or("a number greater than 0")?);
         Ok(())
     }),
-    ("told_start", "whether paper-ekf is told where it starts", |case, value| {
+    ("told_start", "false", "whether paper-ekf is told where it starts", |case, value| {
         let Value::Truth(told) = value else { return Err("true or false".into()) };
         // Only the paper's filter can be told; the other methods of a study start as they always do.
         case.setup.told_start = *told && case.setup.method == MethodKind::PaperEkf;
         Ok(())
     }),
-    ("noise_deg", "standard deviation of noisy bearings, degrees", |case, value| {
+    ("noise_deg", "0.3", "standard deviation of noisy bearings", |case, value| {
         case.setup.noise.get_or_insert_default().sd_rad = at_least_0(value)?.to_radians();
         Ok(())
     }),
-    ("noise_dropout", "share of noisy bearings that are missed", |case, value| {
+    ("noise_dropout", "0.05", "share of noisy bearings that are missed", |case, value| {
         set_share(&mut case.setup.noise.get_or_insert_default().dropout, value)
     }),
-    ("noise_false", "share of noisy bearings that are false", |case, value| {
+    ("noise_false", "0.02", "share of noisy bearings that are false", |case, value| {
         set_share(&mut case.setup.noise.get_or_insert_default().false_match, value)
     }),
-    ("hidden_share", "share of the home landmarks never seen on the way", |case, value| {
+    ("hidden_share", "0", "share of the home landmarks never seen on the way", |case, value| {
         set_share(&mut case.setup.degradation.hidden, value)
     }),
-    ("false_match_share", "share of bearings made false matches", |case, value| {
+    ("false_match_share", "0", "share of bearings made false matches", |case, value| {
         set_share(&mut case.setup.degradation.false_match, value)
     }),
-    ("added_noise_deg", "noise added to bearings of any sensor, degrees", |case, value| {
+    ("added_noise_deg", "0", "noise added to bearings of any sensor", |case, value| {
         case.setup.degradation.noise_sd_rad = at_least_0(value)?.to_radians();
         Ok(())
     }),
-    ("floor_friction", "friction of the whole floor, its zones taken away", |case, value| {
+    ("floor_friction", "the world's", "friction of the whole floor, its zones taken away", |case, value| {
         let friction = value.number().ok_or("a number")?;
         case.draft.set_friction(friction).map_err(|e| e.to_string())
     }),
-    ("walkers", "how many of the world's walkers stay", |case, value| {
+    ("walkers", "all", "how many of the world's walkers stay", |case, value| {
         let Value::Whole(count) = value else { return Err("a whole number".into()) };
         let count = usize::try_from(*count).map_err(|_| "a whole number from 0")?;
         case.draft.keep_walkers(count).map_err(|e| e.to_string())
     }),
-    ("image_noise_electrons", "read noise of the camera on the way and at home", |case, value| {
+    ("image_noise_electrons", "the camera's", "read noise of the camera on the way and at home", |case, value| {
         let read = at_least_0(value)?;
         let saturation = 10_000.0; // of the decent camera
         put(
@@ -139,7 +147,7 @@ const SETTINGS: &[(&str, &str, Apply)] = &[
 /// When there is none of this name, or it does not take the value: what was found and what is allowed.
 pub(super) fn apply(case: &mut Case, name: &str, value: &Value) -> Result<()> {
     let refused = |allowed: String| Error::Invalid { what: name.to_owned(), found: value.to_string(), allowed };
-    if let Some((_, _, apply)) = SETTINGS.iter().find(|(known, ..)| *known == name) {
+    if let Some((.., apply)) = SETTINGS.iter().find(|(known, ..)| *known == name) {
         return apply(case, value).map_err(refused);
     }
     match name.split_once('.') {
@@ -165,38 +173,71 @@ pub(super) fn rank(name: &str) -> usize {
 
 /// Whether there is a setting of this name. Fields of the world are checked by the world itself.
 pub(super) fn exists(name: &str) -> bool {
-    SETTINGS.iter().any(|(known, ..)| *known == name)
-        || all_names().contains(&without_entries(name))
+    catalogue().iter().any(|known| known.key == without_entries(name))
         || name.strip_prefix("world.").is_some_and(|place| place.contains('['))
 }
 
 /// Whether there are settings whose names go on from this one, as `world.floor.friction` does from `world.floor`.
 pub(super) fn has_parts(name: &str) -> bool {
     let beginning = format!("{name}.");
-    all_names().iter().any(|known| known.starts_with(&beginning))
+    catalogue().iter().any(|known| known.key.starts_with(&beginning))
 }
 
-/// All settings with a few words each; fields of the world, the filter and the extractor without.
+/// What a study can set.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Setting {
+    /// Its name in study files.
+    pub key: String,
+    /// Its unit; empty where it has none.
+    pub unit: &'static str,
+    /// What it is where nothing is set; empty where a world has to say.
+    pub default: String,
+    /// What it means, in a line.
+    pub meaning: String,
+}
+
+impl Setting {
+    fn new(key: String, default: String, meaning: String) -> Self {
+        let unit = UNITS.iter().find(|(ending, _)| key.ends_with(ending)).map_or("", |(_, unit)| *unit);
+        Self { key, unit, default, meaning }
+    }
+}
+
+/// Endings of names, the longer ones first, and the units that they tell.
+const UNITS: [(&str, &str); 14] = [
+    ("_m_s2", "m/s^2"),
+    ("_rad_s2", "rad/s^2"),
+    ("_rad_s", "rad/s"),
+    ("_rad_m", "rad/m"),
+    ("_m_s", "m/s"),
+    ("_deg", "deg"),
+    ("_rad", "rad"),
+    ("_electrons", "electrons"),
+    ("_share", "share"),
+    ("_kg", "kg"),
+    ("_px", "px"),
+    ("_hz", "Hz"),
+    ("_m", "m"),
+    ("_s", "s"),
+];
+
+/// All settings.
 #[must_use]
-pub fn catalogue() -> Vec<(String, &'static str)> {
-    let words = |name: &str| SETTINGS.iter().find(|(known, ..)| *known == name).map_or("", |(_, words, _)| *words);
-    all_names().into_iter().map(|name| (name.clone(), words(&name))).collect()
+pub fn catalogue() -> Vec<Setting> {
+    let own =
+        SETTINGS.iter().map(|(key, default, meaning, _)| Setting::new((*key).into(), (*default).into(), (*meaning).into()));
+    let of = |prefix: &'static str, schema: schemars::Schema| {
+        let setting = move |field: Field| Setting::new(format!("{prefix}.{}", field.place), field.default, field.meaning);
+        fields(schema.as_value()).into_iter().map(setting)
+    };
+    let filter = of("filter", schemars::schema_for!(FilterSettings));
+    let extractor = of("extractor", schemars::schema_for!(ExtractorSettings));
+    let world = of("world", schemars::schema_for!(WorldSpec));
+    own.chain(filter.filter(|setting| !OF_THE_ROBOT.contains(&setting.key.as_str()))).chain(extractor).chain(world).collect()
 }
 
 /// Fields of the filter that the robot's data sheet says, whatever they were set to: the world has them.
 const OF_THE_ROBOT: [&str; 2] = ["filter.track_m", "filter.camera_offset_m"];
-
-fn all_names() -> Vec<String> {
-    let fields = |prefix: &str, settings: serde_json::Value| -> Vec<String> {
-        settings.as_object().into_iter().flatten().map(|(key, _)| format!("{prefix}.{key}")).collect()
-    };
-    let mut names: Vec<String> = SETTINGS.iter().map(|(name, ..)| (*name).to_owned()).collect();
-    names.extend(fields("filter", serde_json::to_value(FilterSettings::default()).unwrap_or_default()));
-    names.retain(|name| !OF_THE_ROBOT.contains(&name.as_str()));
-    names.extend(fields("extractor", serde_json::to_value(ExtractorSettings::default()).unwrap_or_default()));
-    names.extend(World::field_names().into_iter().map(|place| format!("world.{place}")));
-    names
-}
 
 /// `world.obstacles[2].height_m` as `world.obstacles[].height_m`.
 fn without_entries(name: &str) -> String {
@@ -213,28 +254,11 @@ fn without_entries(name: &str) -> String {
 /// The settings whose names are most like `name`, for a message.
 pub(super) fn near(name: &str) -> String {
     let last = |name: &str| name.rsplit('.').next().unwrap_or(name).to_owned();
-    let mut names: Vec<(usize, String)> = all_names()
-        .into_iter()
-        .map(|known| (distance(name, &known).min(1 + distance(&last(name), &last(&known))), known))
-        .collect();
+    let distance = |known: &str| levenshtein(name, known).min(1 + levenshtein(&last(name), &last(known)));
+    let mut names: Vec<(usize, String)> = catalogue().into_iter().map(|known| (distance(&known.key), known.key)).collect();
     names.sort();
     let nearest: Vec<String> = names.into_iter().take(5).map(|(_, name)| name).collect();
     format!("a setting; the nearest are {} (`wayhome sweep --settings` lists all)", nearest.join(", "))
-}
-
-/// Letters to put in, take out or change to make one word the other (Levenshtein 1966).
-fn distance(a: &str, b: &str) -> usize {
-    let b: Vec<char> = b.chars().collect();
-    let mut row: Vec<usize> = (0..=b.len()).collect();
-    for (i, letter) in a.chars().enumerate() {
-        let mut diagonal = std::mem::replace(&mut row[0], i + 1);
-        for (j, other) in b.iter().enumerate() {
-            let changed = diagonal + usize::from(letter != *other);
-            diagonal = row[j + 1];
-            row[j + 1] = changed.min(row[j] + 1).min(diagonal + 1);
-        }
-    }
-    row[b.len()]
 }
 
 /// A contender's method, and what else its name says; what it does not say stays. `exec:COMMAND` is a program of the user's own.
@@ -274,15 +298,18 @@ fn put(case: &mut Case, place: &str, value: &impl Serialize) -> std::result::Res
     case.draft.set(place, value).map_err(|e| e.to_string())
 }
 
-/// Sets `field` to that of `all` whose name in files is the value.
-fn choose<T: Serialize + Copy>(field: &mut T, all: &[T], value: &Value) -> std::result::Result<(), Refusal> {
-    let name = |one: &T| serde_json::to_value(one).ok().and_then(|v| Some(v.as_str()?.to_owned())).unwrap_or_default();
-    let found = all.iter().find(|one| value.text() == Some(name(one).as_str()));
-    *field = *found.ok_or_else(|| all.iter().map(name).collect::<Vec<_>>().join(", "))?;
+/// Sets `field` to that of `all` whose name is the value.
+fn choose<T: Copy + Into<&'static str>>(field: &mut T, all: &[T], value: &Value) -> std::result::Result<(), Refusal> {
+    let found = all.iter().find(|one| value.text() == Some((**one).into()));
+    *field = *found.ok_or_else(|| all.iter().map(|one| (*one).into()).collect::<Vec<&str>>().join(", "))?;
     Ok(())
 }
 
-fn choose_one<T: Serialize + Copy>(field: &mut Option<T>, all: &[T], value: &Value) -> std::result::Result<(), Refusal> {
+fn choose_one<T: Copy + Into<&'static str>>(
+    field: &mut Option<T>,
+    all: &[T],
+    value: &Value,
+) -> std::result::Result<(), Refusal> {
     let mut chosen = *all.first().ok_or("nothing")?;
     choose(&mut chosen, all, value)?;
     *field = Some(chosen);
@@ -302,6 +329,7 @@ fn change<T: Serialize + DeserializeOwned>(settings: &mut T, field: &str, value:
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::sensor::Noise;
 
     fn case() -> Case {
         Case { draft: Draft::open("crowd").unwrap(), setup: Setup::default() }
@@ -348,8 +376,28 @@ mod tests {
         assert!(told("filter.track_m", Value::Real(0.3)).contains("world.robot.track_m"));
         assert!(told("light", Value::Text("dusk".into())).contains("evening"));
         assert!(told("walkers", Value::Whole(12)).contains("0 to 9"));
-        assert_eq!((distance("slip", "slipper"), distance("kitten", "sitting")), (3, 3));
-        assert!(catalogue().iter().any(|(name, _)| name == "world.robot.mass_kg"));
+        assert!(catalogue().iter().any(|setting| setting.key == "world.robot.mass_kg" && setting.unit == "kg"));
         assert!(!exists("world.floor.grip") && exists("world.landmarks[0].height_m"));
+    }
+
+    #[test]
+    fn settings_say_what_they_are_and_their_defaults_change_nothing() {
+        // What a world has to say has no default; the name of an alternative, as in `shape.disc`, says all that there is to say.
+        for Setting { key, default, meaning, .. } in catalogue().iter().filter(|setting| !setting.key.starts_with("world.")) {
+            assert!(!meaning.is_empty() && !default.is_empty(), "{key}: [{default}] {meaning}");
+        }
+        let base = Setup { renderer: RendererChoice::Cpu, noise: Some(Noise::default()), ..Setup::default() };
+        for (key, default, ..) in SETTINGS {
+            let value = match (default.parse::<f64>(), default.parse::<bool>()) {
+                (Ok(number), _) => Value::Real(number),
+                (_, Ok(truth)) => Value::Truth(truth),
+                _ => Value::Text((*default).to_owned()),
+            };
+            let mut case = Case { draft: Draft::open("crowd").unwrap(), setup: base.clone() };
+            // Such as "the world's" are words for people, which no setting takes.
+            if apply(&mut case, key, &value).is_ok() {
+                assert_eq!(case.setup, base, "{key} = {default}");
+            }
+        }
     }
 }
