@@ -108,6 +108,38 @@ fn rows_are_the_same_however_they_came_about() {
 }
 
 #[test]
+fn one_axis_at_a_time_is_a_slice_of_the_grid() {
+    let base = ready();
+    let at = base.path();
+    let rows = |folder: &str| Table::from_parquet(fs::read(at.join(folder).join("rows.parquet")).unwrap()).unwrap();
+    let alone = STUDY.replace("\"quick\"", "\"alone\"").replace("[settings]", "design = \"one-at-a-time\"\n[settings]");
+    fs::write(at.join("alone.toml"), alone.replace("2.0, 9.0]", "2.0]").replace("1..23", "1..2")).unwrap();
+    done(wayhome(at, &["sweep", "alone.toml", "--out", "a", "--shard", "2/2"]));
+    done(wayhome(at, &["sweep", "alone.toml", "--out", "a", "--shard", "1/2"]));
+    done(wayhome(at, &["sweep", "report", "a"]));
+    let table = rows("a");
+    // Two starts and two shares, for two methods and two seeds each.
+    assert_eq!(table.rows(), (2 + 2) * 2 * 2);
+    let Some(Cells::Real(distances)) = table.column("start_distance_m") else { panic!() };
+    let Some(Cells::Real(hidden)) = table.column("hidden_share") else { panic!() };
+    assert!(distances.iter().zip(hidden).all(|(distance, hidden)| distance.is_some() != hidden.is_some()));
+    assert!(texts(&table, "method").chunks(4).all(|four| four == ["anchored-ekf", "anchored-ekf", "alv", "alv"]));
+
+    // A start at 1 m with nothing else set is the grid's with nothing hidden.
+    done(wayhome(at, &["sweep", "quick.toml", "--seeds", "1..2", "--out", "grid"]));
+    let numbers = |table: &Table| match table.column("final_distance_m") {
+        Some(Cells::Real(cells)) => cells[..4].to_vec(),
+        _ => panic!(),
+    };
+    assert_eq!(numbers(&table), numbers(&rows("grid")));
+    let cells = fs::read_to_string(at.join("a/report/cells.csv")).unwrap();
+    let starts: Vec<&str> = cells.lines().map(|line| line.split(",2,").next().unwrap()).collect();
+    let head = "start_distance_m,hidden_share,method,";
+    assert!(starts[0].starts_with(head) && starts[1..3] == ["1,,anchored-ekf", "1,,alv"] && starts[8] == ",0.9,alv", "{cells}");
+    assert!(at.join("a/report/success-by-hidden_share.svg").is_file() && !at.join("a/report/success-alv.svg").exists());
+}
+
+#[test]
 fn a_row_runs_again_exactly() {
     let base = ready();
     let at = base.path();
@@ -157,6 +189,7 @@ fn faults_of_a_study_are_told_before_anything_runs() {
         1,
         &["line 7", "time_limt_s", "world.task.time_limit_s"],
     );
+    refuse("bearings = \"noisy\"", "noise_deg = 1.0", 1, &["the study's settings", "--noise-*", "--bearings noisy"]);
     refuse("seeds = \"1..23\"", "seeds = \"23..1\"", 1, &["line 4", "A..B"]);
     refuse("world = \"lab\"", "world = \"moon\"", 1, &["line 3", "moon", "built-in"]);
     refuse("name = \"quick\"", "nam = \"quick\"", 1, &["line 2", "nam", "name"]);
@@ -182,9 +215,13 @@ fn faults_of_a_study_are_told_before_anything_runs() {
 
 #[test]
 fn built_in_studies_can_be_run() {
-    for (name, cells, episodes) in
-        [("slip-occlusion", 144, 4320), ("wet-hall", 48, 960), ("light-camera", 50, 1000), ("faults-sobol", 768, 3072)]
-    {
+    for (name, cells, episodes) in [
+        ("slip-occlusion", 144, 4320),
+        ("wet-hall", 48, 960),
+        ("light-camera", 50, 1000),
+        ("faults-sobol", 768, 3072),
+        ("robustness", 26, 1040),
+    ] {
         let study = Study::open(name, None).unwrap_or_else(|error| panic!("{name}: {error}"));
         assert_eq!((study.cells(), study.episodes()), (cells, episodes), "{name}");
         let covered: u64 = (0..study.chunks()).map(|k| study.chunk(k).count).sum();
@@ -194,7 +231,7 @@ fn built_in_studies_can_be_run() {
             study.case(&study.values(cell)).unwrap_or_else(|error| panic!("{name}, cell {cell}: {error}"));
         }
     }
-    assert_eq!(Study::builtin_names().len(), 4, "the list above has all of them");
+    assert_eq!(Study::builtin_names().len(), 5, "the list above has all of them");
 }
 
 /// The interpreter with the packages of `tests/outside/requirements.txt`, where `.ci/run` or a person has made one.

@@ -4,16 +4,15 @@ use std::ops::RangeInclusive;
 use std::path::PathBuf;
 
 use anyhow::Result;
-use strum::VariantArray;
 use wayhome::Error;
 use wayhome::episode::{PlantKind, Setup};
 use wayhome::report::robustness as report;
-use wayhome::study::robustness::{Axis, batches, run as run_study};
+use wayhome::study::robustness::{Axis, run as run_study, study};
 use wayhome::world::World;
 
 use super::context::{Context, Verdict, open_folder};
 use super::setup::{MethodArgs, SetupArgs};
-use super::values::{choice, count, range, seeds};
+use super::values::{choice, range, seeds};
 
 /// Arguments of `robustness`.
 #[derive(Debug, clap::Args)]
@@ -40,19 +39,15 @@ pub struct RobustnessArgs {
 pub fn run(args: &RobustnessArgs, context: &Context) -> Result<Verdict> {
     let setup = Setup { method: args.method.kind(), law: args.method.controller, ..args.setup.setup() };
     setup.check()?;
-    let world = World::open(&args.world)?;
-    // Each once and in the order of the report; all where none is named.
-    let is_chosen = |axis: &Axis| args.axis.is_empty() || args.axis.contains(axis);
-    let axes: Vec<Axis> = Axis::VARIANTS.iter().copied().filter(is_chosen).collect();
-    if setup.plant == PlantKind::Unicycle && axes.contains(&Axis::Friction) {
+    let study = study(&args.world, &setup, &args.axis, &args.seeds)?;
+    if setup.plant == PlantKind::Unicycle && (args.axis.is_empty() || args.axis.contains(&Axis::Friction)) {
         let (found, allowed) = ("--plant unicycle, which does not slip".into(), "--plant rapier, or other axes".into());
         return Err(Error::Invalid { what: "plant for --axis friction".into(), found, allowed }.into());
     }
-    let parts = ["robustness", &world.spec.name, &range(&args.seeds)];
+    let parts = ["robustness", &World::open(&args.world)?.spec.name, &range(&args.seeds)];
     let (out, folder) = open_folder(args.out.as_deref(), &parts, "robustness", report::FILES)?;
-    let bar = context.progress(Some(batches(&axes) as u64 * count(&args.seeds)))?;
-    let watch = |axis: Axis, level: f64| bar.done(format!("{} {level}", axis.name()));
-    let study = run_study(&world, &setup, &axes, &args.seeds, &context.pool(), &watch)?;
+    let bar = context.progress(Some(study.episodes()))?;
+    let study = run_study(&study, &context.pool(), &|row| bar.done(study.place_in_words(row)))?;
     drop(bar);
     report::write(folder, &study, &context.command_line(&[]))?;
     context.print_made(&study, &out, || format!("{}\nfiles  {}\n", report::table(&study), out.display()))?;

@@ -12,7 +12,7 @@ use wayhome::Error;
 use wayhome::report::sweep as page;
 use wayhome::study::statistics::wilson_95;
 use wayhome::study::sweep::store::{Rate, StudyFolder};
-use wayhome::study::sweep::{Row, Setting, Study, catalogue, run as run_chunks};
+use wayhome::study::sweep::{Row, Setting, Study, catalogue, exhibits, run as run_chunks};
 
 use super::context::{Context, Verdict, folder_or, print};
 use super::values::{seeds, shard};
@@ -221,8 +221,10 @@ fn report(study: &Path, out: Option<&Path>, context: &Context) -> Result<Verdict
     let folder = StudyFolder::open(study)?;
     let out = out.map_or_else(|| study.join("report"), Path::to_owned);
     let bar = context.progress(None)?;
-    page::write(&folder, &out, &mut || bar.at("running failures again"))?;
+    let rows = folder.rows()?;
+    let (shown, withheld) = exhibits(folder.study(), &rows, page::EXHIBITS, &mut || bar.at("running failures again"))?;
     drop(bar);
+    page::write(&folder, &rows, (&shown, withheld), &out)?;
     let page = out.join("index.html").display().to_string();
     context.print(&serde_json::json!({ "page": page }), || format!("page    {page}\n"))?;
     Ok(Verdict::Done)

@@ -73,7 +73,7 @@ impl TypedValueParser for MethodParser {
     fn possible_values(&self) -> Option<Box<dyn Iterator<Item = PossibleValue> + '_>> {
         let program =
             "A program of your own, such as exec:\"python3 my_method.py\"; the README says what it is told and answers";
-        let own = MethodKind::built_in().map(|kind| described(&kind));
+        let own = MethodKind::BUILT_IN.into_iter().map(|kind| described(&kind));
         Some(Box::new(own.chain([PossibleValue::new("exec:COMMAND").help(program)])))
     }
 }

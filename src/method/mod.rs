@@ -13,7 +13,7 @@ use std::fmt;
 use std::str::FromStr;
 
 use serde::{Serialize, Serializer};
-use strum::{EnumIter, EnumMessage, IntoEnumIterator, IntoStaticStr};
+use strum::{EnumMessage, IntoStaticStr};
 
 use crate::control::escape::Escape;
 use crate::control::vectors::VectorLaw;
@@ -29,7 +29,7 @@ pub use paper::untold;
 use vector::VectorHoming;
 
 /// Homing methods by name. A method is read from its name and shown by it: `alv`, or `exec:python3 my_method.py`.
-#[derive(Debug, Clone, PartialEq, Eq, EnumIter, EnumMessage, IntoStaticStr)]
+#[derive(Debug, Clone, PartialEq, Eq, EnumMessage, IntoStaticStr)]
 #[strum(serialize_all = "kebab-case")]
 pub enum MethodKind {
     /// Filter that starts from nothing and anchors home when it can.
@@ -46,15 +46,13 @@ pub enum MethodKind {
     /// Visual servoing with one constant range; no estimate.
     Ibvs,
     /// A program of your own, such as exec:"python3 my_method.py"; the README says what it is told and answers.
-    #[strum(disabled)]
     Exec(ExecCommand),
 }
 
 impl MethodKind {
     /// The methods that the project brings.
-    pub fn built_in() -> impl Iterator<Item = Self> {
-        Self::iter()
-    }
+    pub const BUILT_IN: [Self; 6] =
+        [Self::AnchoredEkf, Self::PaperEkf, Self::Alv, Self::TronDaniilidis, Self::Weber, Self::Ibvs];
 
     /// Name without what belongs to one program.
     #[must_use]
@@ -111,14 +109,10 @@ impl FromStr for MethodKind {
         if let Some(command) = text.strip_prefix(exec::PREFIX) {
             return ExecCommand::parse(command).map(Self::Exec);
         }
-        Self::built_in().find(|kind| kind.name() == text).ok_or_else(|| Error::Invalid {
+        Self::BUILT_IN.into_iter().find(|kind| kind.name() == text).ok_or_else(|| Error::Invalid {
             what: "method".into(),
             found: format!("`{text}`"),
-            allowed: format!(
-                "{}, {}COMMAND",
-                Self::built_in().map(|kind| kind.name()).collect::<Vec<_>>().join(", "),
-                exec::PREFIX
-            ),
+            allowed: format!("{}, {}COMMAND", Self::BUILT_IN.map(|kind| kind.name()).join(", "), exec::PREFIX),
         })
     }
 }

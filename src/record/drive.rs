@@ -1,11 +1,11 @@
 //! The files of one open-loop drive.
 
-use super::columns::{self, Columns, number};
 use crate::draw::map::{MapDrawing, PathStyle};
 use crate::episode::open_loop::{DriveStep, DriveSummary};
 use crate::error::Result;
 use crate::geometry::{Pose, Vector2};
 use crate::physics::Collision;
+use crate::storage::csv::{self, Columns, number};
 use crate::storage::{FolderFile, OutputFolder, json};
 use crate::world::World;
 
@@ -74,7 +74,7 @@ impl<'a> DriveFiles<'a> {
     /// When a file cannot be created.
     pub fn begin(mut folder: OutputFolder, world: &'a World) -> Result<Self> {
         let mut rows = folder.begin("drive.csv")?;
-        rows.append(&columns::header(COLUMNS))?;
+        rows.append(&csv::header(COLUMNS))?;
         let mut collisions = folder.begin("collisions.csv")?;
         collisions.append("t_s,with,impulse_n_s\n")?;
         Ok(Self { folder, world, rows, collisions, truth: Trail::default(), odometry: Trail::default(), ends: None })
@@ -85,7 +85,7 @@ impl<'a> DriveFiles<'a> {
     /// # Errors
     /// When a file cannot be written.
     pub fn add(&mut self, step: &DriveStep, collisions: &[Collision]) -> Result<()> {
-        self.rows.append(&columns::row(COLUMNS, step))?;
+        self.rows.append(&csv::row(COLUMNS, step))?;
         for hit in collisions {
             let with = hit.with.name(self.world).replace(['"', ',', '\n', '\r'], " ");
             self.collisions.append(&format!("{},{with},{}\n", hit.time_s, hit.impulse_n_s))?;

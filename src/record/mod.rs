@@ -7,7 +7,6 @@
 //!
 //! Knows of: episodes, drawing. Must not know what drives them.
 
-mod columns;
 pub mod drive;
 #[cfg_attr(not(any(feature = "recording", feature = "video")), allow(dead_code, reason = "recordings alone write such files"))]
 mod file;

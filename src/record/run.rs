@@ -2,13 +2,13 @@
 
 use std::path::Path;
 
-use super::columns::{self, Columns, number};
 use super::path_plot::path_svg;
 use super::tum;
 use crate::draw::image::colours_png;
 use crate::episode::{Belief, Record, Recorder, Step, Summary};
 use crate::error::Result;
 use crate::observation::Estimate;
+use crate::storage::csv::{self, Columns, number};
 use crate::storage::{OutputFolder, json};
 use crate::world::World;
 
@@ -93,6 +93,6 @@ fn write(mut folder: OutputFolder, world: &World, record: &Record, summary: &Sum
 /// One row a control step, empty cells where there is no number.
 #[must_use]
 pub fn trajectory_csv(steps: &[Step]) -> String {
-    let rows = steps.iter().copied().zip(Belief::of_steps(steps)).map(|of| columns::row(COLUMNS, &of));
-    std::iter::once(columns::header(COLUMNS)).chain(rows).collect()
+    let rows = steps.iter().copied().zip(Belief::of_steps(steps)).map(|of| csv::row(COLUMNS, &of));
+    std::iter::once(csv::header(COLUMNS)).chain(rows).collect()
 }

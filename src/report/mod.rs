@@ -7,6 +7,7 @@
 
 pub mod bound;
 pub mod compare;
+mod curves;
 pub mod dataset;
 pub mod paper;
 pub mod robustness;

@@ -7,7 +7,7 @@ use crate::episode::open_loop::DriveSummary;
 use crate::episode::{Outcome, PoseRecord, Summary};
 use crate::study::row::RunRow;
 use crate::study::seeds::SeedsSummary;
-use crate::study::tally::Spread;
+use crate::study::tally::{Spread, Tally};
 
 /// One run.
 #[must_use]
@@ -109,39 +109,31 @@ pub fn drive(summary: &DriveSummary, folder: &Path) -> String {
 /// A batch.
 #[must_use]
 pub fn seeds(batch: &SeedsSummary, rows: &[RunRow], folder: &Path) -> String {
-    let (b, t) = (batch, &batch.tally);
-    let mut text = format!(
-        "{:>6}  {:<8} {:>8} {:>9} {:>8} {:>6} {:>6}\n",
-        "seed", "outcome", "start m", "final cm", "time s", "ratio", "nees"
-    );
-    for row in rows {
-        let optional = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |v| format!("{v:.2}"));
-        let _ = writeln!(
-            text,
-            "{:>6}  {:<8} {:>8.2} {:>9.2} {:>8.1} {:>6} {:>6}",
-            row.seed,
-            <&str>::from(row.outcome),
-            row.start_distance_m.unwrap_or(f64::NAN),
-            100.0 * row.final_distance_m.unwrap_or(f64::NAN),
-            row.time_s.unwrap_or(f64::NAN),
-            optional(row.time_ratio),
-            optional(row.nees),
-        );
-    }
-    let [low, high] = t.home_share_95;
+    let t = &batch.tally;
+    let mut table = vec![["seed", "outcome", "start m", "final cm", "time s", "ratio", "nees"].map(str::to_owned)];
+    table.extend(rows.iter().map(|row| {
+        [
+            row.seed.to_string(),
+            row.outcome.to_string(),
+            number(row.start_distance_m, 1.0, ""),
+            number(row.final_distance_m, 100.0, ""),
+            number(row.time_s, 1.0, ""),
+            number(row.time_ratio, 1.0, ""),
+            number(row.nees, 1.0, ""),
+        ]
+    }));
     let headline = format!(
-        "\nhome within {}: {}/{} (95 % Wilson {low:.2}-{high:.2})",
-        centimetres(b.setup.arrival_radius_m),
+        "\nhome within {}: {}/{} (95 % Wilson {})",
+        centimetres(batch.setup.arrival_radius_m),
         t.home,
-        t.runs
+        t.runs,
+        percent_95(t)
     );
-    let spread = |s: &Spread, scale: f64, unit: &str| match (s.median, s.p90, s.max) {
-        (Some(median), Some(p90), Some(max)) => {
-            format!("median {:.2}{unit}, 90 % {:.2}{unit}, most {:.2}{unit}", scale * median, scale * p90, scale * max)
-        }
-        _ => "-".to_owned(),
+    let spread = |s: &Spread, scale: f64, unit: &str| {
+        let of = |value| number(value, scale, unit);
+        if s.count == 0 { of(None) } else { format!("median {}, 90 % {}, most {}", of(s.median), of(s.p90), of(s.max)) }
     };
-    let rows = [
+    let mut told = vec![
         ("time ratio", spread(&t.time_ratio, 1.0, "")),
         ("final distance", spread(&t.final_distance_m, 100.0, " cm")),
         ("where it claimed home", spread(&t.claimed_distance_m, 100.0, " cm")),
@@ -150,12 +142,38 @@ pub fn seeds(batch: &SeedsSummary, rows: &[RunRow], folder: &Path) -> String {
         ("NEES (3 is consistent)", spread(&t.nees, 1.0, "")),
         ("wrong claims", t.wrong_claims.to_string()),
         ("timeout, lost, stuck", format!("{}, {}, {}", t.outcomes.timeout, t.outcomes.lost, t.outcomes.stuck)),
-        ("method broke", t.outcomes.failed.to_string()),
-        ("runs with collisions", t.runs_with_collisions.to_string()),
-        ("files", folder.display().to_string()),
     ];
-    let shown = rows.into_iter().filter(|(name, value)| *name != "method broke" || value != "0");
-    text + &table(&headline, &shown.collect::<Vec<_>>())
+    if t.outcomes.failed > 0 {
+        told.push(("method broke", t.outcomes.failed.to_string()));
+    }
+    told.push(("runs with collisions", t.runs_with_collisions.to_string()));
+    told.push(("files", folder.display().to_string()));
+    columns(0, &table) + &self::table(&headline, &told)
+}
+
+/// A number of a table with two decimals, `scale` times the value; a dash where there is none.
+pub(super) fn number(value: Option<f64>, scale: f64, unit: &str) -> String {
+    value.map_or_else(|| "-".to_owned(), |v| format!("{:.2}{unit}", scale * v))
+}
+
+/// The 95 % interval of the share that came home.
+pub(super) fn percent_95(tally: &Tally) -> String {
+    let [low, high] = tally.home_share_95.map(|share| 100.0 * share);
+    format!("{low:.0}-{high:.0} %")
+}
+
+/// Rows of which the first `texts` cells are flush left and all others, which hold numbers, flush right.
+pub(super) fn columns<const N: usize>(texts: usize, rows: &[[String; N]]) -> String {
+    let widths: [usize; N] = std::array::from_fn(|k| rows.iter().map(|row| row[k].chars().count()).max().unwrap_or(0));
+    let mut text = String::new();
+    for row in rows {
+        let cells = row.iter().zip(widths).enumerate();
+        let padded =
+            cells.map(|(k, (cell, width))| if k < texts { format!("{cell:width$}") } else { format!("{cell:>width$}") });
+        text += padded.collect::<Vec<_>>().join("  ").trim_end();
+        text.push('\n');
+    }
+    text
 }
 
 fn centimetres(metres: f64) -> String {

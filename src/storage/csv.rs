@@ -1,69 +1,57 @@
-//! CSV tables (RFC 4180) of records whose field names are the columns.
+//! CSV tables (RFC 4180): one list says each column's name and where its cells come from.
 
-use serde::{Serialize, Serializer};
+/// Columns of a table whose rows are made of `R`.
+pub type Columns<R> = [(&'static str, fn(&R) -> String)];
 
-/// The records as a table, names first. Without records there is no first line either.
+/// The whole table, names first.
 #[must_use]
-pub fn csv<T: Serialize>(records: impl IntoIterator<Item = T>) -> String {
-    // Flat structs always serialise, and a growing text takes all that is written.
-    let mut table = csv::Writer::from_writer(Vec::new());
-    for record in records {
-        let _ = table.serialize(record);
-    }
-    text(table)
+pub fn csv<'r, R: 'r>(columns: &Columns<R>, rows: impl IntoIterator<Item = &'r R>) -> String {
+    header(columns) + &rows.into_iter().map(|of| row(columns, of)).collect::<String>()
 }
 
-/// [`csv()`] with columns before those of the records, whose names are known at run time only.
+/// [`csv()`] with columns before the others whose names are known at run time only.
 #[must_use]
-pub fn csv_with<T: Serialize>(names: &[&str], records: &[(Vec<String>, T)]) -> String {
-    let tails = csv(records.iter().map(|(_, record)| record));
-    let mut tails = csv::ReaderBuilder::new().has_headers(false).from_reader(tails.as_bytes());
-    let heads =
-        std::iter::once(names.to_vec()).chain(records.iter().map(|(head, _)| head.iter().map(String::as_str).collect()));
-    let mut table = csv::Writer::from_writer(Vec::new());
-    for (head, tail) in heads.zip(tails.records().flatten()) {
-        let _ = table.write_record(head.into_iter().chain(tail.iter()));
-    }
-    text(table)
+pub fn csv_with<R>(names: &[&str], columns: &Columns<R>, rows: &[(Vec<String>, R)]) -> String {
+    let names = names.iter().map(|name| (*name).to_owned()).chain(columns.iter().map(|(name, _)| (*name).to_owned()));
+    let rows = rows.iter().map(|(head, of)| line(head.iter().cloned().chain(columns.iter().map(|(_, cell)| cell(of)))));
+    line(names) + &rows.collect::<String>()
 }
 
-fn text(table: csv::Writer<Vec<u8>>) -> String {
+/// The first line.
+#[must_use]
+pub fn header<R>(columns: &Columns<R>) -> String {
+    line(columns.iter().map(|(name, _)| (*name).to_owned()))
+}
+
+/// A row.
+#[must_use]
+pub fn row<R>(columns: &Columns<R>, of: &R) -> String {
+    line(columns.iter().map(|(_, cell)| cell(of)))
+}
+
+/// A number with as many digits as it takes to read it back without loss; an empty cell where there is none.
+#[must_use]
+pub fn number(value: impl Into<Option<f64>>) -> String {
+    value.into().filter(|v| v.is_finite()).map_or_else(String::new, |v| v.to_string())
+}
+
+fn line(cells: impl Iterator<Item = String>) -> String {
+    // A text that grows takes all that is written.
+    let mut table = csv::Writer::from_writer(Vec::new());
+    let _ = table.write_record(cells.map(String::into_bytes));
     table.into_inner().ok().and_then(|bytes| String::from_utf8(bytes).ok()).unwrap_or_default()
-}
-
-/// Writes a number as all tables have it: in full, without an exponent; nothing where there is none, or it is not finite.
-///
-/// # Errors
-/// What the writer fails with.
-pub fn decimal<S: Serializer>(value: &(impl Copy + Into<Option<f64>>), to: S) -> Result<S::Ok, S::Error> {
-    match (*value).into().filter(|v| v.is_finite()) {
-        Some(value) => to.collect_str(&value),
-        None => to.serialize_none(),
-    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    #[derive(Serialize)]
-    struct Record {
-        seed: u64,
-        #[serde(serialize_with = "decimal")]
-        range_m: Option<f64>,
-        #[serde(serialize_with = "decimal")]
-        time_s: f64,
-    }
-
     #[test]
     fn numbers_are_in_full_and_cells_stay_cells() {
-        let record = |seed, range_m, time_s| Record { seed, range_m, time_s };
-        let records = [record(1, Some(-0.000_08), 2.0), record(2, None, f64::NAN)];
-        assert_eq!(csv(&records), "seed,range_m,time_s\n1,-0.00008,2\n2,,\n");
-        let led = records.map(|record| (vec!["a \"b\", c".to_owned()], record));
-        assert_eq!(
-            csv_with(&["who"], &led),
-            "who,seed,range_m,time_s\n\"a \"\"b\"\", c\",1,-0.00008,2\n\"a \"\"b\"\", c\",2,,\n"
-        );
+        let columns: &Columns<(u64, Option<f64>)> = &[("seed", |r| r.0.to_string()), ("range_m", |r| number(r.1))];
+        let rows = [(1, Some(-0.000_08)), (2, None), (3, Some(f64::NAN))];
+        assert_eq!(csv(columns, &rows), "seed,range_m\n1,-0.00008\n2,\n3,\n");
+        let led = rows.map(|row| (vec!["a \"b\", c".to_owned()], row));
+        assert!(csv_with(&["who"], columns, &led).starts_with("who,seed,range_m\n\"a \"\"b\"\", c\",1,-0.00008\n"));
     }
 }

@@ -2,7 +2,7 @@
 //!
 //! Knows of: files and errors.
 
-mod csv;
+pub mod csv;
 mod folder;
 
 use std::fs;
@@ -13,7 +13,6 @@ use sha2::{Digest, Sha256};
 
 use crate::error::{Error, Result};
 
-pub use csv::{csv, csv_with, decimal};
 pub use folder::{FolderFile, OutputFolder};
 pub(crate) use folder::{MARKER, files, remove};
 

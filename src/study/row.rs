@@ -1,28 +1,11 @@
 //! What a run says: the one row that tables are made of.
 
-use serde::Serialize;
-use strum::{EnumString, IntoStaticStr, VariantArray};
+use strum::{Display, EnumString};
 
 use crate::episode::{EstimateErrors, Outcome, Summary};
-use crate::storage::decimal;
 
 /// How a run ended, or why it has no result.
-#[derive(
-    Debug,
-    Clone,
-    Copy,
-    PartialEq,
-    Eq,
-    PartialOrd,
-    Ord,
-    Default,
-    Serialize,
-    EnumString,
-    IntoStaticStr,
-    VariantArray,
-    strum::Display,
-)]
-#[serde(rename_all = "lowercase")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Display, EnumString)]
 #[strum(serialize_all = "lowercase")]
 pub enum Ending {
     /// As [`Outcome::Home`].
@@ -54,92 +37,66 @@ impl From<Outcome> for Ending {
     }
 }
 
-/// One run in numbers, those of its [`Summary`]; `None` where the run has no such number. As a record of CSV it is a row of
-/// `seeds.csv`, which leaves out what only studies of many settings ask for.
-#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+/// One run in numbers, those of its [`Summary`]; `None` where the run has no such number.
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct RunRow {
     /// Seed.
     pub seed: u64,
     /// How it ended.
     pub outcome: Ending,
     /// Why it did not end at home; empty where it did.
-    #[serde(skip)]
     pub reason: String,
     /// Whether the method claimed to be home, rightly or not.
     pub claimed_home: Option<bool>,
     /// Distance from home at the start, m.
-    #[serde(serialize_with = "decimal")]
     pub start_distance_m: Option<f64>,
     /// x of the start in the room, m.
-    #[serde(skip)]
     pub start_x_m: Option<f64>,
     /// y of the start in the room, m.
-    #[serde(skip)]
     pub start_y_m: Option<f64>,
     /// Heading at the start in the room, rad.
-    #[serde(skip)]
     pub start_heading_rad: Option<f64>,
     /// Distance from home at rest, m.
-    #[serde(serialize_with = "decimal")]
     pub final_distance_m: Option<f64>,
     /// Heading at rest against that of home, rad.
-    #[serde(skip)]
     pub final_heading_error_rad: Option<f64>,
     /// When it ended, s.
-    #[serde(serialize_with = "decimal")]
     pub time_s: Option<f64>,
     /// Time straight ahead to the arrival radius, s.
-    #[serde(skip)]
     pub straight_line_time_s: Option<f64>,
     /// The one over the other, of runs that reached home.
-    #[serde(serialize_with = "decimal")]
     pub time_ratio: Option<f64>,
     /// Length of the true path, m.
-    #[serde(serialize_with = "decimal")]
     pub path_length_m: Option<f64>,
     /// Distance at the end between odometry alone and the truth, m.
-    #[serde(serialize_with = "decimal")]
     pub odometry_drift_m: Option<f64>,
     /// Contacts with walls and bodies.
     pub collisions: Option<i64>,
     /// Error of the last estimate's range, m.
-    #[serde(serialize_with = "decimal")]
     pub range_error_m: Option<f64>,
     /// Error of its bearing from home, rad.
-    #[serde(serialize_with = "decimal")]
     pub bearing_error_rad: Option<f64>,
     /// Error of its heading, rad.
-    #[serde(serialize_with = "decimal")]
     pub heading_error_rad: Option<f64>,
     /// Root mean square error of range over all estimates, m.
-    #[serde(skip)]
     pub range_rmse_m: Option<f64>,
     /// The same of bearing, rad.
-    #[serde(skip)]
     pub bearing_rmse_rad: Option<f64>,
     /// The same of heading, rad.
-    #[serde(skip)]
     pub heading_rmse_rad: Option<f64>,
     /// Mean normalised estimation error squared; 3 is consistent.
-    #[serde(serialize_with = "decimal")]
     pub nees: Option<f64>,
     /// Bearings in the home snapshot.
-    #[serde(skip)]
     pub home_landmarks: Option<i64>,
     /// Bearings a step that the sensor gave.
-    #[serde(serialize_with = "decimal")]
     pub seen_mean: Option<f64>,
     /// Bearings a step that the method used.
-    #[serde(serialize_with = "decimal")]
     pub matched_mean: Option<f64>,
     /// Bearings a step that the method refused.
-    #[serde(serialize_with = "decimal")]
     pub rejected_mean: Option<f64>,
     /// Control steps until the method stopped.
-    #[serde(skip)]
     pub steps: Option<i64>,
     /// What rendered: `cpu` or `gpu`.
-    #[serde(skip)]
     pub renderer: Option<String>,
 }
 

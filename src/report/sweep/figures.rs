@@ -1,14 +1,12 @@
 //! Which figures a study has, and its tables.
 
-use serde::Serialize;
-
-use super::curves::{Curve, Unit, curves};
 use super::heat::{Cell, heat};
-use crate::storage::{csv_with, decimal};
+use crate::report::curves::{Curve, Unit, WIDTH_PX, curves, document};
+use crate::storage::csv::{Columns, csv_with, number};
 use crate::study::row::Ending;
 use crate::study::statistics::Paired;
-use crate::study::sweep::duels::{Duel, Scale, compared, duels};
-use crate::study::sweep::{Levels, Row, Study};
+use crate::study::sweep::duels::{Duel, Scale, duels};
+use crate::study::sweep::{Design, Row, Study};
 use crate::study::tally::Tally;
 
 /// A figure: what its file is called, what it shows, and the drawing.
@@ -42,7 +40,7 @@ pub(super) struct Sums<'a> {
 
 impl<'a> Sums<'a> {
     pub fn new(study: &'a Study, rows: &'a [Row]) -> Self {
-        let compared = compared(study);
+        let compared = study.compared();
         let others = (0..study.axes.len()).filter(|axis| Some(*axis) != compared).map(|axis| Scale::of(study, axis)).collect();
         Self { study, rows, compared: compared.map(|axis| Scale::of(study, axis)), others, duels: duels(study, rows) }
     }
@@ -54,7 +52,7 @@ impl<'a> Sums<'a> {
 
     /// The rows at these levels of these scales.
     fn at<'s>(&'s self, places: &'s [(&'s Scale, usize)]) -> impl Iterator<Item = &'s Row> + Clone {
-        self.rows.iter().filter(move |row| places.iter().all(|(scale, level)| scale.level(self.study, row) == *level))
+        self.rows.iter().filter(move |row| places.iter().all(|(scale, level)| scale.level(self.study, row) == Some(*level)))
     }
 
     fn tally(&self, level: usize, places: &[(&Scale, usize)]) -> Tally {
@@ -68,6 +66,7 @@ impl<'a> Sums<'a> {
     /// The axes of the heat maps: the second of the others over the first, or the first alone.
     fn plane(&self) -> Option<(&Scale, Option<&Scale>)> {
         match &self.others[..] {
+            _ if self.is_one_at_a_time() => None,
             [] => None,
             [x] => Some((x, None)),
             [y, x, ..] => Some((x, Some(y))),
@@ -116,20 +115,17 @@ impl<'a> Sums<'a> {
             };
             let setting = &self.study.axes[scale.axis].setting;
             let success = curve(|t| (t.runs > 0).then(|| [t.home_share_95[0], t.home_share, t.home_share_95[1]]));
-            figures.push(Figure {
-                name: file_name("success-by", &[setting]),
-                section: Section::Curves,
-                svg: curves("Runs that come home, 95 % Wilson", scale, Unit::Percent, &success),
-            });
+            let mut add = |kind: &str, title: &str, unit: Unit, lines: &[Curve]| {
+                let (drawing, height) = curves(title, (&scale.label, &scale.levels), unit, lines);
+                let svg = document([WIDTH_PX, height]).add(drawing).to_string() + "\n";
+                figures.push(Figure { name: file_name(kind, &[setting]), section: Section::Curves, svg });
+            };
+            add("success-by", "Runs that come home, 95 % Wilson", Unit::Percent, &success);
             let ratio = curve(|t| {
                 let [low, high] = t.time_ratio.quartiles;
                 Some([low?, t.time_ratio.median?, high?])
             });
-            figures.push(Figure {
-                name: file_name("time-ratio-by", &[setting]),
-                section: Section::Curves,
-                svg: curves("Time over straight-line time, quartiles", scale, Unit::Ratio, &ratio),
-            });
+            add("time-ratio-by", "Time over straight-line time, quartiles", Unit::Ratio, &ratio);
         }
         figures
     }
@@ -167,37 +163,46 @@ impl<'a> Sums<'a> {
 
     /// One row a cell of the study's grid: the listed levels and, of sampled axes, their classes.
     pub fn cells_csv(&self) -> String {
-        let mut scales: Vec<&Scale> = self.others.iter().take(2).collect();
-        scales.extend(&self.compared);
-        let rows: Vec<_> = combinations(&scales)
-            .into_iter()
-            .map(|levels| {
-                let places: Vec<(&Scale, usize)> = scales.iter().copied().zip(levels).collect();
-                (labels(&places), CellRow::of(&Tally::of(self.at(&places).map(|row| &row.run))))
-            })
-            .collect();
-        csv_with(&self.settings(&scales), &rows)
+        let scales: Vec<&Scale> = self.tabled().into_iter().chain(&self.compared).collect();
+        let row = |places: Vec<(&Scale, usize)>| {
+            let tally = Tally::of(self.at(&places).map(|row| &row.run));
+            (labels(&scales, &places), tally)
+        };
+        let rows: Vec<_> = self.places(self.compared.as_ref()).into_iter().map(row).collect();
+        csv_with(&self.settings(&scales), CELLS, &rows)
     }
 
     /// One row for every two of the compared ones and cell, and one for all cells together.
     pub fn pairs_csv(&self) -> String {
-        let scales: Vec<&Scale> = self.others.iter().take(2).collect();
-        let names = self.names();
+        let (scales, names) = (self.tabled(), self.names());
         let mut rows = Vec::new();
         for duel in &self.duels {
             let mut add = |levels: Vec<String>, pairs: Paired, interval: [f64; 2]| {
                 let two = duel.levels.iter().map(|level| names[*level].clone());
-                rows.push((two.chain(levels).collect(), PairRow::of(&pairs, interval)));
+                rows.push((two.chain(levels).collect(), (pairs, interval)));
             };
             let bootstrap = duel.success.map_or([-1.0, 1.0], |(_, interval)| interval);
             add(vec!["all".to_owned(); scales.len()], duel.all, bootstrap);
-            for levels in combinations(&scales) {
-                let places: Vec<(&Scale, usize)> = scales.iter().copied().zip(levels).collect();
+            for places in self.places(None) {
                 let pairs = self.pairs_at(duel, &places);
-                add(labels(&places), pairs, pairs.difference_95());
+                add(labels(&scales, &places), pairs, pairs.difference_95());
             }
         }
-        csv_with(&[&["first", "second"], &self.settings(&scales)[..]].concat(), &rows)
+        csv_with(&[&["first", "second"], &self.settings(&scales)[..]].concat(), PAIRS, &rows)
+    }
+
+    /// The scales, beside the compared one, that tables have columns for.
+    fn tabled(&self) -> Vec<&Scale> {
+        self.others.iter().take(if self.is_one_at_a_time() { usize::MAX } else { 2 }).collect()
+    }
+
+    /// The levels of each row of a table: all that go together, times those of `compared`.
+    fn places<'s>(&'s self, compared: Option<&'s Scale>) -> Vec<Vec<(&'s Scale, usize)>> {
+        let tabled = self.tabled();
+        let together: Vec<Vec<&Scale>> =
+            if self.is_one_at_a_time() { tabled.into_iter().map(|scale| vec![scale]).collect() } else { vec![tabled] };
+        let all = together.into_iter().map(|scales| scales.into_iter().chain(compared).collect::<Vec<_>>());
+        all.flat_map(|scales| combinations(&scales)).collect()
     }
 
     /// Settings of the scales' axes.
@@ -216,7 +221,12 @@ impl<'a> Sums<'a> {
 
     /// Whether some axis is sampled.
     pub fn is_sampled(&self) -> bool {
-        self.study.axes.iter().any(|axis| matches!(axis.levels, Levels::Between { .. }))
+        self.study.axes.iter().any(|axis| axis.levels.listed().is_empty())
+    }
+
+    /// Whether each axis varies by itself.
+    pub fn is_one_at_a_time(&self) -> bool {
+        self.study.design == Design::OneAtATime
     }
 }
 
@@ -232,9 +242,9 @@ fn success_cell(tally: &Tally) -> Option<Cell> {
 }
 
 /// All combinations of the scales' levels, the last one changing fastest.
-fn combinations(scales: &[&Scale]) -> Vec<Vec<usize>> {
-    scales.iter().fold(vec![Vec::new()], |known, scale| {
-        let longer = |levels: Vec<usize>| (0..scale.levels.len()).map(move |level| [&levels[..], &[level]].concat());
+fn combinations<'s>(scales: &[&'s Scale]) -> Vec<Vec<(&'s Scale, usize)>> {
+    scales.iter().fold(vec![Vec::new()], |known, &scale| {
+        let longer = |places: Vec<_>| (0..scale.levels.len()).map(move |level| [&places[..], &[(scale, level)]].concat());
         known.into_iter().flat_map(longer).collect()
     })
 }
@@ -247,87 +257,42 @@ fn file_name(kind: &str, words: &[&str]) -> String {
     name.chars().map(harmless).collect::<String>() + ".svg"
 }
 
-/// What figures call the levels.
-fn labels(places: &[(&Scale, usize)]) -> Vec<String> {
-    places.iter().map(|(scale, level)| scale.levels[*level].clone()).collect()
+/// What figures call the levels of these scales; empty for those that have none here.
+fn labels(scales: &[&Scale], places: &[(&Scale, usize)]) -> Vec<String> {
+    let level = |scale: &&Scale| places.iter().find(|(other, _)| other.axis == scale.axis);
+    scales.iter().map(|scale| level(scale).map_or_else(String::new, |(scale, level)| scale.levels[*level].clone())).collect()
 }
 
-/// A row of `cells.csv`, after its levels.
-#[derive(Serialize)]
-struct CellRow {
-    runs: usize,
-    home: usize,
-    #[serde(serialize_with = "decimal")]
-    home_share: f64,
-    #[serde(serialize_with = "decimal")]
-    home_share_low_95: f64,
-    #[serde(serialize_with = "decimal")]
-    home_share_high_95: f64,
-    wrong_claims: usize,
-    timeout: usize,
-    lost: usize,
-    stuck: usize,
-    failed: usize,
-    panic: usize,
-    error: usize,
-    collided: usize,
-    #[serde(serialize_with = "decimal")]
-    time_ratio_q25: Option<f64>,
-    #[serde(serialize_with = "decimal")]
-    time_ratio_median: Option<f64>,
-    #[serde(serialize_with = "decimal")]
-    time_ratio_q75: Option<f64>,
-    #[serde(serialize_with = "decimal")]
-    final_distance_median_m: Option<f64>,
-}
+/// Columns of `cells.csv`, after its levels.
+const CELLS: &Columns<Tally> = &[
+    ("runs", |t| t.runs.to_string()),
+    ("home", |t| t.home.to_string()),
+    ("home_share", |t| number(t.home_share)),
+    ("home_share_low_95", |t| number(t.home_share_95[0])),
+    ("home_share_high_95", |t| number(t.home_share_95[1])),
+    ("wrong_claims", |t| t.wrong_claims.to_string()),
+    ("timeout", |t| t.outcomes.timeout.to_string()),
+    ("lost", |t| t.outcomes.lost.to_string()),
+    ("stuck", |t| t.outcomes.stuck.to_string()),
+    ("failed", |t| t.outcomes.failed.to_string()),
+    ("panic", |t| t.outcomes.panic.to_string()),
+    ("error", |t| t.outcomes.error.to_string()),
+    ("collided", |t| t.runs_with_collisions.to_string()),
+    ("time_ratio_q25", |t| number(t.time_ratio.quartiles[0])),
+    ("time_ratio_median", |t| number(t.time_ratio.median)),
+    ("time_ratio_q75", |t| number(t.time_ratio.quartiles[1])),
+    ("final_distance_median_m", |t| number(t.final_distance_m.median)),
+];
 
-impl CellRow {
-    fn of(t: &Tally) -> Self {
-        let ([low, high], [q25, q75], counts) = (t.home_share_95, t.time_ratio.quartiles, t.outcomes);
-        Self {
-            runs: t.runs,
-            home: t.home,
-            home_share: t.home_share,
-            home_share_low_95: low,
-            home_share_high_95: high,
-            wrong_claims: t.wrong_claims,
-            timeout: counts.timeout,
-            lost: counts.lost,
-            stuck: counts.stuck,
-            failed: counts.failed,
-            panic: counts.panic,
-            error: counts.error,
-            collided: t.runs_with_collisions,
-            time_ratio_q25: q25,
-            time_ratio_median: t.time_ratio.median,
-            time_ratio_q75: q75,
-            final_distance_median_m: t.final_distance_m.median,
-        }
-    }
-}
-
-/// A row of `pairs.csv`, after the two and their levels.
-#[derive(Serialize)]
-struct PairRow {
-    pairs: usize,
-    both: usize,
-    only_first: usize,
-    only_second: usize,
-    neither: usize,
-    #[serde(serialize_with = "decimal")]
-    difference: f64,
-    #[serde(serialize_with = "decimal")]
-    low_95: f64,
-    #[serde(serialize_with = "decimal")]
-    high_95: f64,
-    #[serde(serialize_with = "decimal")]
-    mcnemar_mid_p: f64,
-}
-
-impl PairRow {
-    fn of(pairs: &Paired, [low_95, high_95]: [f64; 2]) -> Self {
-        let Paired { both, only_first, only_second, neither } = *pairs;
-        let (difference, mcnemar_mid_p) = (pairs.difference(), pairs.mid_p());
-        Self { pairs: pairs.trials(), both, only_first, only_second, neither, difference, low_95, high_95, mcnemar_mid_p }
-    }
-}
+/// Columns of `pairs.csv`, after the two and their levels; the interval is that of the difference.
+const PAIRS: &Columns<(Paired, [f64; 2])> = &[
+    ("pairs", |(p, _)| p.trials().to_string()),
+    ("both", |(p, _)| p.both.to_string()),
+    ("only_first", |(p, _)| p.only_first.to_string()),
+    ("only_second", |(p, _)| p.only_second.to_string()),
+    ("neither", |(p, _)| p.neither.to_string()),
+    ("difference", |(p, _)| number(p.difference())),
+    ("low_95", |(_, [low, _])| number(*low)),
+    ("high_95", |(_, [_, high])| number(*high)),
+    ("mcnemar_mid_p", |(p, _)| number(p.mid_p())),
+];

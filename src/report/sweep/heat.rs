@@ -1,13 +1,11 @@
 //! Heat maps: a coloured cell a pair of levels, with a number and its interval in it.
 
-use svg::Document;
 use svg::node::element::{Group, Title};
 
 use crate::draw::chart::{FAINT_INK, INK, line, px, rectangle, text};
+use crate::report::curves::{WIDTH_PX, document};
 use crate::study::sweep::duels::Scale;
 
-/// Width of a figure, px: that of a phone, where it is shown as it is; on a desk several stand side by side.
-pub(super) const WIDTH_PX: f64 = 360.0;
 /// Sizes of the font that intervals are written in, px: the usual one, and the least, below which they are left out.
 const INTERVAL_PX: [f64; 2] = [9.0, 7.0];
 /// Height of a row, px.
@@ -42,7 +40,7 @@ pub(super) fn heat(title: &str, x: &Scale, y: Option<&Scale>, cells: &[Vec<Optio
     let height = bottom + labels + 22.0 + 34.0;
     let longest = cells.iter().flatten().flatten().map(|cell| cell.interval.chars().count()).max().unwrap_or(0);
     let interval_px = ((column - 5.0) / (LETTER * longest.max(1) as f64)).min(INTERVAL_PX[0]);
-    let mut page = document(height).add(text(title, 4.0, 18.0, 14.0).set("font-weight", "bold").set("fill", INK));
+    let mut page = document([WIDTH_PX, height]).add(text(title, 4.0, 18.0, 14.0).set("font-weight", "bold").set("fill", INK));
     for (row, cells) in cells.iter().enumerate() {
         let at = top + ROW_PX * row as f64;
         if let Some(y) = y {
@@ -72,14 +70,6 @@ pub(super) fn heat(title: &str, x: &Scale, y: Option<&Scale>, cells: &[Vec<Optio
         page = page.add(name.set("transform", format!("rotate(-90 12 {})", px(middle))));
     }
     page.add(draw_key([left, height - 24.0, right], key)).to_string() + "\n"
-}
-
-/// An empty white figure.
-pub(super) fn document(height: f64) -> Document {
-    Document::new()
-        .set("viewBox", format!("0 0 {} {}", px(WIDTH_PX), px(height)))
-        .set("font-family", "Helvetica, Arial, 'Liberation Sans', 'DejaVu Sans', sans-serif")
-        .add(rectangle([0.0, 0.0, WIDTH_PX, height]).set("fill", "#ffffff"))
 }
 
 fn draw(cell: Option<&Cell>, [left, top, right, bottom]: [f64; 4], interval_px: f64) -> Group {

@@ -1,49 +1,36 @@
 //! The folder of a stress study, and the page that shows what came of it.
 
-mod curves;
 mod figures;
 mod gallery;
 mod heat;
 mod page;
 
-use std::ops::ControlFlow;
 use std::path::Path;
 
 use crate::error::Result;
 use crate::storage::OutputFolder;
-use crate::study::sweep::duels;
 use crate::study::sweep::store::StudyFolder;
+use crate::study::sweep::{Exhibit, Row};
 use figures::Sums;
 use page::Page;
 
-/// Failures that the page shows.
-const EXHIBITS: usize = 12;
+/// Failures that the page has room for.
+pub const EXHIBITS: usize = 12;
 
-/// Writes the report of a complete study: `index.html`, its figures as SVG and its tables as CSV. `watch` is called before each
-/// failure that is run again for the gallery.
+/// Writes the report of a complete study with these rows: `index.html`, its figures as SVG and its tables as CSV. `exhibits` are failures
+/// that were run again, and beside them how many could not be.
 ///
 /// # Errors
-/// When rows are missing, the folder cannot be written, or `watch` breaks.
-pub fn write(folder: &StudyFolder, out: &Path, watch: &mut dyn FnMut() -> ControlFlow<()>) -> Result<()> {
-    let rows = folder.rows()?;
+/// When the folder cannot be written.
+pub fn write(folder: &StudyFolder, rows: &[Row], (exhibits, withheld): (&[Exhibit], usize), out: &Path) -> Result<()> {
     let study = folder.study();
-    let sums = Sums::new(study, &rows);
+    let sums = Sums::new(study, rows);
     let figures = sums.figures();
     let mut report = OutputFolder::open(out, "sweep report", &["index.html", "cells.csv", "pairs.csv", "README.md", "*.svg"])?;
-    let (mut exhibits, mut withheld) = (Vec::new(), 0);
-    for row in duels::failures(study, &rows, EXHIBITS) {
-        if watch().is_break() {
-            return Err(crate::error::Error::Interrupted);
-        }
-        match gallery::exhibit(folder, row)? {
-            Some(exhibit) => exhibits.push(exhibit),
-            None => withheld += 1,
-        }
-    }
     let page = Page {
         sums: &sums,
         figures: &figures,
-        exhibits: &exhibits,
+        exhibits,
         withheld,
         rates: &folder.rates()?,
         folder: folder.path().display().to_string(),

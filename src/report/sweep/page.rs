@@ -3,9 +3,9 @@
 use std::fmt::Write;
 
 use super::figures::{Figure, Section, Sums};
-use super::gallery::{Exhibit, data_uri};
+use super::gallery::pictures;
 use crate::study::sweep::store::Rate;
-use crate::study::sweep::{Design, Row};
+use crate::study::sweep::{Design, Exhibit};
 use crate::study::tally::{OutcomeCounts, Tally};
 
 const STYLE: &str = "
@@ -88,15 +88,14 @@ impl Page<'_> {
     }
 
     fn success(&self, text: &mut String) {
-        let pooled = if self.sums.others.len() > 2 || self.sums.is_sampled() {
+        let pooled = if self.sums.others.len() > 2 && !self.sums.is_one_at_a_time() || self.sums.is_sampled() {
             " Axes that a figure does not show are pooled, and ranges are cut into classes."
         } else {
             ""
         };
-        let words = format!(
-            "Percent of runs that claimed to be home and came to rest within the arrival radius of it, with their 95 % Wilson \
-             interval below.{pooled}"
-        );
+        let below = if self.sums.is_one_at_a_time() { "" } else { ", with their 95 % Wilson interval below" };
+        let words =
+            format!("Percent of runs that claimed to be home and came to rest within the arrival radius of it{below}.{pooled}");
         self.section(text, Section::Success, "Who comes home", &words);
         let names = self.sums.names();
         *text += "<div class=\"scroll\"><table>\n<tr><th></th><th>runs</th><th>home</th><th>95 %</th><th>wrong claims</th>";
@@ -107,7 +106,7 @@ impl Page<'_> {
         for (level, name) in names.iter().enumerate() {
             let rows = self.sums.rows.iter();
             let scale = self.sums.compared.as_ref();
-            let rows = rows.filter(|row| scale.is_none_or(|scale| scale.level(self.sums.study, row) == level));
+            let rows = rows.filter(|row| scale.is_none_or(|scale| scale.level(self.sums.study, row) == Some(level)));
             let t = Tally::of(rows.map(|row| &row.run));
             let [low, high] = t.home_share_95;
             let _ = write!(
@@ -134,9 +133,11 @@ impl Page<'_> {
     }
 
     fn curve_words(&self) -> String {
-        "Success with its 95 % Wilson interval, and time over straight-line time of the runs that came home with its quartiles; \
-         all other axes are pooled. Time ratios of runs that come home only from near by look better than they are."
-            .to_owned()
+        let others = if self.sums.is_one_at_a_time() { "left as they are" } else { "pooled" };
+        format!(
+            "Success with its 95 % Wilson interval, and time over straight-line time of the runs that came home with its quartiles; \
+             all other axes are {others}. Time ratios of runs that come home only from near by look better than they are."
+        )
     }
 
     fn section(&self, text: &mut String, section: Section, title: &str, words: &str) {
@@ -206,23 +207,15 @@ impl Page<'_> {
                   last panorama. Black is the true path from the start, dotted green what odometry alone would have told, dashed orange the \
                   estimate with 2-sigma ellipses where a method makes one, red home, blue the end. The command runs a row again \
                   exactly.</p>\n<div class=\"figures\">\n";
-        for Exhibit { row, path, panorama } in self.exhibits {
-            let _ = write!(
-                text,
-                "<figure><img alt=\"path of row {}\" src=\"{}\">",
-                row.episode,
-                data_uri("image/svg+xml", path.as_bytes())
-            );
-            if let Some(jpeg) = panorama {
-                let _ =
-                    write!(text, "<img alt=\"last panorama of row {}\" src=\"{}\">", row.episode, data_uri("image/jpeg", jpeg));
-            }
+        for exhibit in self.exhibits {
+            let row = &exhibit.row;
+            let _ = write!(text, "<figure>{}", pictures(exhibit));
             let _ = writeln!(
                 text,
                 "<figcaption><b>{}</b>: {}<br>{}<br><code>wayhome home --replay {}:{}</code></figcaption></figure>",
                 row.run.outcome,
                 escaped(&row.run.reason),
-                escaped(&self.place(row)),
+                escaped(&self.sums.study.place_in_words(row)),
                 escaped(&self.folder),
                 row.episode
             );
@@ -245,14 +238,6 @@ impl Page<'_> {
         }
     }
 
-    /// Where a row lies in the study, in words.
-    fn place(&self, row: &Row) -> String {
-        let mut words: Vec<String> =
-            self.sums.study.axes.iter().zip(row.values.iter()).map(|(axis, value)| format!("{} {value}", axis.label)).collect();
-        words.push(format!("seed {}", row.run.seed));
-        words.join(", ")
-    }
-
     fn settings(&self, text: &mut String) {
         let study = self.sums.study;
         let mut rows: Vec<(&str, String)> = vec![
@@ -264,6 +249,7 @@ impl Page<'_> {
                 "design",
                 match study.design {
                     Design::Grid => "grid".to_owned(),
+                    Design::OneAtATime => "one axis at a time".to_owned(),
                     Design::Random => format!("{} random points", study.points),
                     Design::Sobol => format!("{} points of a Sobol sequence, shifted", study.points),
                 },

@@ -8,24 +8,28 @@ use crate::random::Seed;
 pub const SOBOL_AXES: usize = 10;
 
 /// How points are chosen.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
-#[serde(rename_all = "lowercase")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, strum::Display, strum::EnumString, strum::VariantArray)]
+#[serde(rename_all = "kebab-case")]
+#[strum(serialize_all = "kebab-case")]
 pub enum Design {
     /// Every combination of the levels of all axes.
     Grid,
+    /// Every level of each axis by itself; all other axes are left as the study's settings and its world have them. Only the compared
+    /// axis goes through its levels in all of these cells.
+    OneAtATime,
     /// Points drawn at random, independent of one another.
     Random,
     /// Points of Sobol's sequence (1967), shifted at random: they fill the space more evenly than random ones.
     Sobol,
 }
 
-/// The point `index` in [0, 1) on each of `axes` axes; a grid has none.
+/// The point `index` in [0, 1) on each of `axes` axes; designs of listed levels have none.
 ///
 /// Every point depends on the seed and its own index alone, so that a longer study begins with the points of a shorter one.
 #[must_use]
 pub fn point(design: Design, seed: Seed, index: u64, axes: usize) -> Vec<f64> {
     match design {
-        Design::Grid => Vec::new(),
+        Design::Grid | Design::OneAtATime => Vec::new(),
         Design::Random => {
             let mut stream = seed.stream(&format!("point {index}"));
             (0..axes).map(|_| stream.random()).collect()

@@ -38,15 +38,15 @@ impl Scale {
         Self { axis, label: label.clone(), levels }
     }
 
-    /// The level that a row belongs to.
+    /// The level that a row belongs to; `None` where the axis is not set in it.
     #[must_use]
-    pub fn level(&self, study: &Study, row: &Row) -> usize {
+    pub fn level(&self, study: &Study, row: &Row) -> Option<usize> {
         match &study.axes[self.axis].levels {
-            Levels::Listed(values) => values.iter().position(|v| *v == row.values[self.axis]).unwrap_or_default(),
+            Levels::Listed(values) => values.iter().position(|v| *v == row.values[self.axis]),
             Levels::Between { low, high, log } => {
-                let value = row.values[self.axis].number().unwrap_or(*low);
+                let value = row.values[self.axis].number()?;
                 let share = if *log { libm::log(value / low) / libm::log(high / low) } else { (value - low) / (high - low) };
-                ((share * CLASSES as f64) as usize).min(CLASSES - 1)
+                Some(((share * CLASSES as f64) as usize).min(CLASSES - 1))
             }
         }
     }
@@ -84,28 +84,15 @@ pub struct Duel {
     pairs: Vec<(u64, u64, bool, bool)>,
 }
 
-/// The axis whose levels are compared; `None` where the study has no such axis, or it has one level.
-#[must_use]
-pub fn compared(study: &Study) -> Option<usize> {
-    study
-        .axes
-        .iter()
-        .position(|axis| axis.setting == study.compare && matches!(&axis.levels, Levels::Listed(values) if values.len() > 1))
-}
-
 /// Compares every two levels of the compared axis: all runs that differ in nothing else are a pair.
 #[must_use]
 pub fn duels(study: &Study, rows: &[Row]) -> Vec<Duel> {
-    let Some(axis) = compared(study) else { return Vec::new() };
-    let scale = Scale::of(study, axis);
-    let stride: u64 = study.axes[axis + 1..]
-        .iter()
-        .map(|a| if let Levels::Listed(values) = &a.levels { values.len() as u64 } else { 1 })
-        .product();
+    let Some(axis) = study.compared() else { return Vec::new() };
+    let (scale, stride) = (Scale::of(study, axis), study.stride(axis));
     // Cell without its level on the axis, and seed.
     let mut pairs: BTreeMap<(u64, u64), Vec<Option<&Row>>> = BTreeMap::new();
     for row in rows {
-        let level = scale.level(study, row);
+        let Some(level) = scale.level(study, row) else { continue };
         let key = (row.cell - level as u64 * stride, row.run.seed);
         pairs.entry(key).or_insert_with(|| vec![None; scale.levels.len()])[level] = Some(row);
     }
@@ -153,14 +140,14 @@ impl Duel {
 /// cell where all runs end alike before those where they do not.
 #[must_use]
 pub fn failures<'a>(study: &Study, rows: &'a [Row], most: usize) -> Vec<&'a Row> {
-    let scale = compared(study).map(|axis| Scale::of(study, axis));
+    let scale = study.compared().map(|axis| Scale::of(study, axis));
     let mut home_in_cell: BTreeMap<u64, usize> = BTreeMap::new();
     for row in rows.iter().filter(|row| row.run.is_home()) {
         *home_in_cell.entry(row.cell).or_default() += 1;
     }
     let mut kinds: BTreeMap<(usize, usize), Vec<&Row>> = BTreeMap::new();
     for row in rows {
-        let level = scale.as_ref().map_or(0, |scale| scale.level(study, row));
+        let level = scale.as_ref().and_then(|scale| scale.level(study, row)).unwrap_or_default();
         // A run without a result has no path to show.
         let shown = [Ending::Lost, Ending::Timeout, Ending::Stuck];
         if let Some(outcome) = shown.iter().position(|outcome| *outcome == row.run.outcome) {
@@ -230,7 +217,7 @@ mod tests {
         for axis in 0..3 {
             let scale = Scale::of(&study, axis);
             let counts = (0..scale.levels.len())
-                .map(|level| Tally::of(rows.iter().filter(|row| scale.level(&study, row) == level).map(|row| &row.run)))
+                .map(|level| Tally::of(rows.iter().filter(|row| scale.level(&study, row) == Some(level)).map(|row| &row.run)))
                 .collect::<Vec<_>>();
             assert_eq!(counts.iter().map(|t| t.runs).sum::<usize>(), 48);
             assert!(counts.iter().all(|t| t.runs == 2 * t.home && t.runs == t.home + t.outcomes.lost));

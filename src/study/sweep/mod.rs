@@ -8,6 +8,7 @@
 mod design;
 pub mod duels;
 pub mod merge;
+mod read;
 pub mod rows;
 mod run;
 pub mod settings;
@@ -17,7 +18,7 @@ mod value;
 
 pub use design::{Design, SOBOL_AXES};
 pub use rows::Row;
-pub use run::{Failure, Store, replay, run};
+pub use run::{Exhibit, Failure, Store, exhibits, replay, run};
 pub use settings::{Setting, catalogue};
 pub use spec::{Axis, Chunk, Levels, MOST_EPISODES, Study};
 pub use value::Value;

@@ -29,6 +29,16 @@ impl Row {
     }
 }
 
+impl Study {
+    /// Where a row lies in the study, in words.
+    #[must_use]
+    pub fn place_in_words(&self, row: &Row) -> String {
+        let set = self.axes.iter().zip(row.values.iter()).filter(|(_, value)| **value != Value::Unset);
+        let words = set.map(|(axis, value)| format!("{} {value}", axis.label));
+        words.chain([format!("seed {}", row.run.seed)]).collect::<Vec<_>>().join(", ")
+    }
+}
+
 /// A number of a run, to be read or set.
 type Field<T> = fn(&mut RunRow) -> &mut Option<T>;
 
@@ -81,7 +91,7 @@ pub fn table(study: &Study, rows: &[Row]) -> Table {
         } else if all(|v| matches!(v, Value::Truth(_))) {
             table.bools(name, values.map(|v| if let Value::Truth(b) = v { Some(*b) } else { None }))
         } else {
-            table.texts(name, values.map(Value::to_string))
+            table.texts(name, values.map(|v| (*v != Value::Unset).then(|| v.to_string())))
         };
     }
     let mut runs: Vec<RunRow> = rows.iter().map(|r| r.run.clone()).collect();

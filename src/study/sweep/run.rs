@@ -1,7 +1,9 @@
 //! Running chunks of a study, in parallel, with nothing that an episode does able to end the study.
 
-use std::sync::Arc;
+use std::ops::ControlFlow;
+use std::sync::{Arc, Mutex, PoisonError};
 
+use super::duels::failures;
 use super::rows::{Row, without_result};
 use super::spec::{Chunk, Study};
 use super::value::Value;
@@ -24,6 +26,18 @@ pub trait Store: Sync {
     /// # Errors
     /// When it cannot be kept; the study then ends.
     fn keep_failure(&self, failure: &Failure<'_>) -> Result<()>;
+}
+
+/// Keeps rows in memory, in the order in which chunks end, and no records.
+impl Store for Mutex<Vec<Row>> {
+    fn keep(&self, _chunk: &Chunk, rows: &[Row]) -> Result<()> {
+        self.lock().unwrap_or_else(PoisonError::into_inner).extend_from_slice(rows);
+        Ok(())
+    }
+
+    fn keep_failure(&self, _failure: &Failure<'_>) -> Result<()> {
+        Ok(())
+    }
 }
 
 /// An episode that ran and did not end at home.
@@ -111,6 +125,38 @@ pub fn replay(study: &Study, number: u64) -> Result<(World, Setup, Record, Summa
     let (record, summary) = ran.map_err(Broken::into_error)?;
     let row = Row::of(number, cell, &values, &summary);
     Ok((world, setup, record, summary, row))
+}
+
+/// A failed run that was run again.
+pub struct Exhibit {
+    /// Its row.
+    pub row: Row,
+    /// The world it ran in.
+    pub world: World,
+    /// What happened.
+    pub record: Record,
+}
+
+/// Runs failures worth a look again, at most `most`, and tells how many did not run as their rows say, because another machine's graphics
+/// or another build made them. `watch` is called before each.
+///
+/// # Errors
+/// What a run fails with; [`Error::Interrupted`] when `watch` breaks.
+pub fn exhibits(
+    study: &Study,
+    rows: &[Row],
+    most: usize,
+    watch: &mut dyn FnMut() -> ControlFlow<()>,
+) -> Result<(Vec<Exhibit>, usize)> {
+    let (mut shown, mut withheld) = (Vec::new(), 0);
+    for row in failures(study, rows, most) {
+        if watch().is_break() {
+            return Err(Error::Interrupted);
+        }
+        let (world, _, record, _, again) = replay(study, row.episode)?;
+        if again == *row { shown.push(Exhibit { row: again, world, record }) } else { withheld += 1 }
+    }
+    Ok((shown, withheld))
 }
 
 /// An error with what caused it.

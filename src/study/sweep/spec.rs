@@ -1,20 +1,19 @@
 //! Study files: what a person writes, checked as a whole before anything runs.
 
 use std::ops::RangeInclusive;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use serde::Serialize;
 use sha2::{Digest, Sha256};
 
-use super::design::{self, Design, SOBOL_AXES};
+use super::design::{self, Design};
+use super::read::Reader;
 use super::settings::{self, Case};
 use super::value::Value;
-use crate::document::{Node, Value as Read};
+use crate::document::Node;
 use crate::episode::Setup;
 use crate::error::{Error, Result};
-use crate::fault::Fault;
 use crate::random::Seed;
-use crate::render::RendererChoice;
 use crate::world::{Draft, World};
 
 /// Most episodes of one study.
@@ -22,11 +21,12 @@ pub const MOST_EPISODES: u64 = 100_000_000;
 /// Most episodes in one chunk, the unit in which a study is run, stored and resumed.
 const CHUNK_EPISODES: u64 = 20;
 /// Studies that the program carries with it, as (name, TOML text).
-const BUILTIN: [(&str, &str); 4] = [
+const BUILTIN: [(&str, &str); 5] = [
     ("slip-occlusion", include_str!("../../../worlds/studies/slip-occlusion.toml")),
     ("wet-hall", include_str!("../../../worlds/studies/wet-hall.toml")),
     ("light-camera", include_str!("../../../worlds/studies/light-camera.toml")),
     ("faults-sobol", include_str!("../../../worlds/studies/faults-sobol.toml")),
+    ("robustness", include_str!("../../../worlds/studies/robustness.toml")),
 ];
 
 /// A setting that a study varies.
@@ -57,6 +57,19 @@ pub enum Levels {
     },
 }
 
+impl Levels {
+    /// The listed ones; none where any value may come.
+    #[must_use]
+    pub fn listed(&self) -> &[Value] {
+        if let Self::Listed(values) = self { values } else { &[] }
+    }
+
+    /// By how many an axis multiplies the cells of a grid.
+    fn count(&self) -> u64 {
+        self.listed().len().max(1) as u64
+    }
+}
+
 /// A checked study: cells (one a combination of levels) of episodes (one a seed).
 ///
 /// The episodes of a cell have the study's seeds, the same ones in all cells: runs with one seed start at the same place and meet
@@ -79,7 +92,7 @@ pub struct Study {
     pub seeds: RangeInclusive<u64>,
     /// How points are chosen.
     pub design: Design,
-    /// Points of a random or Sobol design; 1 of a grid.
+    /// Points of a random or Sobol design, else 1.
     pub points: u64,
     /// Settings that all cells share, in the file's order.
     pub settings: Vec<(String, Value)>,
@@ -90,6 +103,9 @@ pub struct Study {
     /// The file's text.
     #[serde(skip)]
     pub text: String,
+    /// What settings are applied to.
+    #[serde(skip)]
+    pub(super) base: Setup,
 }
 
 /// A run of episodes in one cell.
@@ -144,15 +160,9 @@ impl Study {
     /// As [`Study::open`].
     pub fn from_toml(text: &str, source: &Path, seeds: Option<RangeInclusive<u64>>) -> Result<Self> {
         let tree = Node::from_toml(text, source)?;
-        let mut reader = Reader { source, faults: Vec::new() };
-        let study = reader.study(&tree, text, seeds);
-        match study {
-            Some(study) if reader.faults.is_empty() => {
-                study.check(&tree, source)?;
-                Ok(study)
-            }
-            _ => Err(reader.error()),
-        }
+        let study = Reader::new(source).read(&tree, text, seeds)?;
+        study.check(&tree, source)?;
+        Ok(study)
     }
 
     /// Names the study and everything that decides about its rows, this program's version included: rows of studies with equal
@@ -164,9 +174,57 @@ impl Study {
         hash.iter().map(|b| format!("{b:02x}")).collect()
     }
 
-    /// Combinations of the listed levels.
-    fn combinations(&self) -> u64 {
-        self.axes.iter().map(|axis| if let Levels::Listed(values) = &axis.levels { values.len() as u64 } else { 1 }).product()
+    /// The same study on the world that a person named, with its settings and axes applied to another setup, of those axes whose setting
+    /// `wanted` takes. Its rows are no longer those of the file: no folder tells the two apart.
+    ///
+    /// # Errors
+    /// When the world or the setup has faults.
+    pub(in crate::study) fn based_on(mut self, world: &str, base: &Setup, wanted: impl Fn(&str) -> bool) -> Result<Self> {
+        self.axes.retain(|axis| wanted(&axis.setting));
+        (self.world, self.world_sha256) = (world.to_owned(), Draft::open(world)?.world()?.sha256);
+        self.base = base.clone();
+        base.check()?;
+        Ok(self)
+    }
+
+    /// What settings are applied to.
+    pub(in crate::study) fn base(&self) -> &Setup {
+        &self.base
+    }
+
+    /// The axis whose levels are compared; `None` where the study has no such axis, or it has one level.
+    #[must_use]
+    pub fn compared(&self) -> Option<usize> {
+        self.axes.iter().position(|axis| axis.setting == self.compare && axis.levels.listed().len() > 1)
+    }
+
+    /// Levels of the compared axis; 1 where there is none.
+    fn compared_levels(&self) -> u64 {
+        self.compared().map_or(1, |k| self.axes[k].levels.count())
+    }
+
+    /// How many cells of a point lie between two that differ by one level of an axis alone. In a one-at-a-time design only the compared
+    /// axis has such pairs.
+    #[must_use]
+    pub fn stride(&self, axis: usize) -> u64 {
+        match self.design {
+            Design::OneAtATime => 1,
+            _ => self.axes[axis + 1..].iter().map(|axis| axis.levels.count()).product(),
+        }
+    }
+
+    /// Cells of a point: combinations of the listed levels, or in a one-at-a-time design all of them but the compared ones, times
+    /// these.
+    pub(super) fn combinations(&self) -> u64 {
+        let counts = |k: &usize| self.axes[*k].levels.count();
+        match self.design {
+            Design::OneAtATime => {
+                let compared = self.compared();
+                let others = (0..self.axes.len()).filter(|k| Some(*k) != compared);
+                others.map(|k| counts(&k)).sum::<u64>().saturating_mul(self.compared_levels())
+            }
+            _ => (0..self.axes.len()).map(|k| counts(&k)).fold(1, u64::saturating_mul),
+        }
     }
 
     /// Number of cells.
@@ -215,10 +273,14 @@ impl Study {
         (episode / self.episodes_per_cell(), self.seeds.start() + episode % self.episodes_per_cell())
     }
 
-    /// The axes' values in a cell. The last axis changes fastest, the point slowest.
+    /// The axes' values in a cell. The last axis changes fastest, the point slowest; in a one-at-a-time design the compared axis
+    /// changes fastest, and all but it and the one whose turn it is are [`Value::Unset`].
     #[must_use]
     pub fn values(&self, cell: u64) -> Vec<Value> {
-        let sampled = self.axes.iter().filter(|axis| matches!(axis.levels, Levels::Between { .. })).count();
+        if self.design == Design::OneAtATime {
+            return self.values_in_turn(cell);
+        }
+        let sampled = self.axes.iter().filter(|axis| axis.levels.listed().is_empty()).count();
         let point = design::point(self.design, Seed(self.seed), cell / self.combinations(), sampled);
         let mut place = cell % self.combinations();
         let mut coordinate = point.iter().rev();
@@ -242,6 +304,22 @@ impl Study {
         values
     }
 
+    fn values_in_turn(&self, cell: u64) -> Vec<Value> {
+        let (compared, levels) = (self.compared(), self.compared_levels());
+        // Levels that still come before the one whose turn it is; `None` once it has come.
+        let mut before = Some((cell / levels) as usize);
+        let turn = |(k, axis): (usize, &Axis)| {
+            let values = axis.levels.listed();
+            if Some(k) == compared {
+                return values[(cell % levels) as usize].clone();
+            }
+            let place = before.take();
+            before = place.filter(|place| *place >= values.len()).map(|place| place - values.len());
+            place.and_then(|place| values.get(place)).cloned().unwrap_or(Value::Unset)
+        };
+        self.axes.iter().enumerate().map(turn).collect()
+    }
+
     /// World and setup of a cell.
     ///
     /// # Errors
@@ -249,10 +327,9 @@ impl Study {
     pub fn case(&self, values: &[Value]) -> Result<(World, Setup)> {
         let mut settings: Vec<(&str, &Value)> = self.settings.iter().map(|(name, value)| (name.as_str(), value)).collect();
         settings.extend(self.axes.iter().zip(values).map(|(axis, value)| (axis.setting.as_str(), value)));
+        settings.retain(|(_, value)| **value != Value::Unset);
         settings.sort_by_key(|(name, _)| settings::rank(name)); // stable: of two of one rank the later one holds
-        // The CPU, so that rows are the same on a machine with a graphics card.
-        let setup = Setup { renderer: RendererChoice::Cpu, ..Setup::default() };
-        let mut case = Case { draft: Draft::open(&self.world)?, setup };
+        let mut case = Case { draft: Draft::open(&self.world)?, setup: self.base.clone() };
         for (name, value) in settings {
             settings::apply(&mut case, name, value)?;
         }
@@ -261,8 +338,12 @@ impl Study {
 
     /// Sets every level of every axis once, beside the first levels of the others.
     fn check(&self, tree: &Node, source: &Path) -> Result<()> {
-        let first = self.values(0);
-        let try_out = |values: &[Value]| self.case(values).and_then(|(_, setup)| setup.degradation.check());
+        let mut first = self.values(0);
+        if self.design == Design::OneAtATime {
+            let others = (0..first.len()).filter(|k| Some(*k) != self.compared());
+            others.for_each(|k| first[k] = Value::Unset);
+        }
+        let try_out = |values: &[Value]| self.case(values).and_then(|(_, setup)| setup.check());
         if let Err(error) = try_out(&first) {
             let line = self.axes.iter().zip(0..).find_map(|(axis, k)| {
                 let named = matches!(&error, Error::Invalid { what, .. } if *what == axis.setting);
@@ -292,263 +373,4 @@ fn at_place(source: &Path, place: &str, line: Option<usize>, error: &Error) -> E
     let line = line.map_or_else(String::new, |line| format!("line {line}: "));
     let cause = std::error::Error::source(error).map_or_else(String::new, |cause| format!(": {cause}"));
     Error::Parse { path: source.to_owned(), message: format!("{line}{place}: {error}{cause}") }
-}
-
-/// Reads the file's tree and gathers its faults.
-struct Reader<'a> {
-    source: &'a Path,
-    faults: Vec<Fault>,
-}
-
-/// Fields of the file, and of an axis.
-const FIELDS: [&str; 10] = ["name", "description", "world", "seed", "seeds", "design", "points", "settings", "axes", "compare"];
-const AXIS_FIELDS: [&str; 6] = ["setting", "label", "values", "from", "to", "scale"];
-
-impl Reader<'_> {
-    fn error(self) -> Error {
-        let mut faults = self.faults;
-        faults.sort_by_key(|f| f.line);
-        Error::World { path: self.source.to_owned(), faults }
-    }
-
-    fn fault(&mut self, tree: &Node, place: &str, found: impl Into<String>, allowed: impl Into<String>) {
-        let line = tree.locate(place).0;
-        let (place, found, allowed) = (place.to_owned(), found.into(), allowed.into());
-        self.faults.push(Fault { place, found, allowed, owner: None, line });
-    }
-
-    fn study(&mut self, tree: &Node, text: &str, seeds: Option<RangeInclusive<u64>>) -> Option<Study> {
-        self.known(tree, tree, "", &FIELDS);
-        let name = self.text(tree, "name")?.to_owned();
-        if name.is_empty() || !name.chars().all(|c| c.is_alphanumeric() || "-_".contains(c)) {
-            self.fault(tree, "name", format!("\"{name}\""), "letters, digits, - and _");
-        }
-        let world = self.world(tree)?;
-        let world_sha256 = match Draft::open(&world).and_then(|draft| draft.world()) {
-            Ok(world) => world.sha256,
-            Err(error) => {
-                self.fault(tree, "world", format!("\"{world}\""), error.to_string());
-                return None;
-            }
-        };
-        let seeds = match seeds {
-            Some(seeds) => seeds,
-            None => self.seeds(tree)?,
-        };
-        let design = match tree.get("design").map(|n| (n, n.text())) {
-            None | Some((_, Some("grid"))) => Design::Grid,
-            Some((_, Some("random"))) => Design::Random,
-            Some((_, Some("sobol"))) => Design::Sobol,
-            Some((node, _)) => {
-                self.fault(tree, "design", node.describe(), "\"grid\", \"random\" or \"sobol\"");
-                return None;
-            }
-        };
-        let settings = self.settings(tree);
-        let axes = self.axes(tree);
-        let points = self.points(tree, design, &axes)?;
-        let seed = self.whole(tree, "seed", 0)?;
-        let compare = tree.get("compare").and_then(Node::text).unwrap_or("method").to_owned();
-        if tree.get("compare").is_some() && !axes.iter().any(|axis| axis.setting == compare) {
-            self.fault(tree, "compare", format!("\"{compare}\""), "the setting of an axis");
-        }
-        let description = tree.get("description").and_then(Node::text).unwrap_or_default().to_owned();
-        let text = text.to_owned();
-        let study =
-            Study { name, description, world, world_sha256, seed, seeds, design, points, settings, axes, compare, text };
-        let size = study.axes.iter().try_fold(study.points * study.episodes_per_cell(), |size, axis| {
-            let levels = if let Levels::Listed(values) = &axis.levels { values.len() as u64 } else { 1 };
-            size.checked_mul(levels).filter(|size| *size <= MOST_EPISODES)
-        });
-        if size.is_none() {
-            self.fault(tree, "axes", "more episodes than that", format!("{MOST_EPISODES} episodes at most"));
-            return None;
-        }
-        Some(study)
-    }
-
-    /// Refuses fields that there are not.
-    fn known(&mut self, tree: &Node, table: &Node, place: &str, fields: &[&str]) {
-        let Read::Table(entries) = &table.value else { return };
-        for (key, _) in entries.iter().filter(|(key, _)| !fields.contains(&key.as_str())) {
-            let place = if place.is_empty() { key.clone() } else { format!("{place}.{key}") };
-            self.fault(tree, &place, "an unknown field", format!("one of {}", fields.join(", ")));
-        }
-    }
-
-    fn text<'n>(&mut self, tree: &'n Node, field: &str) -> Option<&'n str> {
-        let text = tree.get(field).and_then(Node::text);
-        if text.is_none() {
-            let found = tree.get(field).map_or_else(|| "nothing".to_owned(), Node::describe);
-            self.fault(tree, field, found, "a text in quotes, which must be given");
-        }
-        text
-    }
-
-    fn whole(&mut self, tree: &Node, field: &str, usual: u64) -> Option<u64> {
-        let Some(node) = tree.get(field) else { return Some(usual) };
-        let number = if let Read::Integer(n) = node.value { u64::try_from(n).ok() } else { None };
-        if number.is_none() {
-            self.fault(tree, field, node.describe(), "a whole number from 0");
-        }
-        number
-    }
-
-    /// A world file beside the study file, or what `World::open` takes.
-    fn world(&mut self, tree: &Node) -> Option<String> {
-        let given = self.text(tree, "world")?;
-        let beside: PathBuf = self.source.parent().unwrap_or(Path::new("")).join(given);
-        Some(if beside.is_file() { beside.to_string_lossy().into_owned() } else { given.to_owned() })
-    }
-
-    fn seeds(&mut self, tree: &Node) -> Option<RangeInclusive<u64>> {
-        let node = tree.get("seeds");
-        let range = node.and_then(Node::text).and_then(|text| {
-            let (first, last) = text.split_once("..")?;
-            let (first, last) = (first.parse::<u64>().ok()?, last.trim_start_matches('=').parse::<u64>().ok()?);
-            (first <= last && last - first < MOST_EPISODES && last <= i64::MAX as u64).then_some(first..=last)
-        });
-        if range.is_none() {
-            let found = node.map_or_else(|| "nothing".to_owned(), Node::describe);
-            self.fault(tree, "seeds", found, "\"A..B\", both included, the first not above the last, which must be given");
-        }
-        range
-    }
-
-    fn points(&mut self, tree: &Node, design: Design, axes: &[Axis]) -> Option<u64> {
-        let sampled = axes.iter().filter(|axis| matches!(axis.levels, Levels::Between { .. })).count();
-        if design == Design::Grid {
-            if tree.get("points").is_some() {
-                self.fault(tree, "points", "points of a grid", "none: a grid has its axes' levels");
-            }
-            if let Some(k) = axes.iter().position(|axis| matches!(axis.levels, Levels::Between { .. })) {
-                self.fault(tree, &format!("axes[{k}]"), "from and to in a grid", "values, or design = \"random\" or \"sobol\"");
-            }
-            return Some(1);
-        }
-        if sampled == 0 {
-            self.fault(tree, "design", "no axis with from and to", "at least one in a random or Sobol design");
-        }
-        if design == Design::Sobol && sampled > SOBOL_AXES {
-            self.fault(tree, "design", format!("{sampled} axes with from and to"), format!("{SOBOL_AXES} at most"));
-        }
-        let points = self.whole(tree, "points", 0)?;
-        if points == 0 || points > 1 << 31 {
-            self.fault(tree, "points", points.to_string(), "a whole number from 1 to 2147483648");
-        }
-        Some(points.max(1))
-    }
-
-    fn settings(&mut self, tree: &Node) -> Vec<(String, Value)> {
-        let mut found = Vec::new();
-        match tree.get("settings").map(|node| &node.value) {
-            None => {}
-            Some(Read::Table(entries)) => {
-                for (key, node) in entries {
-                    self.setting(tree, key, node, &mut found);
-                }
-            }
-            Some(_) => self.fault(tree, "settings", "no table", "[settings] with a setting a line"),
-        }
-        found
-    }
-
-    /// A setting, or a table of settings that begin with the same words.
-    fn setting(&mut self, tree: &Node, name: &str, node: &Node, found: &mut Vec<(String, Value)>) {
-        if let Read::Table(entries) = &node.value {
-            let inner = |key: &str| format!("{name}.{key}");
-            // A table is a value of its own only in a list's entry, whose shape or texture is set as a whole.
-            if !settings::exists(name) || settings::has_parts(name) {
-                entries.iter().for_each(|(key, node)| self.setting(tree, &inner(key), node, found));
-                return;
-            }
-        }
-        match Value::read(node) {
-            _ if !settings::exists(name) => {
-                let (found, allowed) = ("no setting".to_owned(), settings::near(name));
-                self.faults.push(Fault { place: format!("settings.{name}"), found, allowed, owner: None, line: node.line });
-            }
-            Some(value) => found.push((name.to_owned(), value)),
-            None => self.fault(tree, &format!("settings.{name}"), node.describe(), "a number, a text, a list or a table"),
-        }
-    }
-
-    fn axes(&mut self, tree: &Node) -> Vec<Axis> {
-        let Some(node) = tree.get("axes") else {
-            self.fault(tree, "axes", "nothing", "[[axes]], at least one");
-            return Vec::new();
-        };
-        let Read::List(items) = &node.value else {
-            self.fault(tree, "axes", node.describe(), "[[axes]], at least one");
-            return Vec::new();
-        };
-        if items.is_empty() {
-            self.fault(tree, "axes", "an empty list", "at least one axis");
-        }
-        let mut axes: Vec<Axis> = Vec::new();
-        for (k, item) in items.iter().enumerate() {
-            let place = format!("axes[{k}]");
-            self.known(tree, item, &place, &AXIS_FIELDS);
-            let Some(setting) = item.get("setting").and_then(Node::text) else {
-                let found = item.get("setting").map_or_else(|| "nothing".to_owned(), Node::describe);
-                self.fault(tree, &format!("{place}.setting"), found, "the name of a setting in quotes");
-                continue;
-            };
-            if !settings::exists(setting) {
-                self.fault(tree, &format!("{place}.setting"), format!("\"{setting}\""), settings::near(setting));
-            }
-            if axes.iter().any(|axis| axis.setting == setting) {
-                self.fault(tree, &format!("{place}.setting"), format!("\"{setting}\" again"), "one axis a setting");
-            }
-            let Some(levels) = self.levels(tree, item, &place, setting) else { continue };
-            let label = item.get("label").and_then(Node::text).unwrap_or(setting).to_owned();
-            axes.push(Axis { setting: setting.to_owned(), label, levels });
-        }
-        axes
-    }
-
-    fn levels(&mut self, tree: &Node, item: &Node, place: &str, setting: &str) -> Option<Levels> {
-        if let Some(node) = item.get("values") {
-            let place = format!("{place}.values");
-            let Read::List(nodes) = &node.value else {
-                self.fault(tree, &place, node.describe(), "a list of values");
-                return None;
-            };
-            if nodes.is_empty() {
-                self.fault(tree, &place, format!("an empty list for axis \"{setting}\""), "at least one value");
-                return None;
-            }
-            let mut values = Vec::new();
-            for node in nodes {
-                match Value::read(node) {
-                    Some(value) if values.contains(&value) => {
-                        self.fault(tree, &place, format!("{value} twice"), "each value once");
-                    }
-                    Some(value) => values.push(value),
-                    None => self.fault(tree, &place, node.describe(), "numbers, texts, lists or tables"),
-                }
-            }
-            return Some(Levels::Listed(values));
-        }
-        let number = |field: &str| item.get(field).and_then(Value::read).and_then(|value| value.number());
-        let (low, high) = (number("from"), number("to"));
-        let log = item.get("scale").and_then(Node::text) == Some("log");
-        if let Some(scale) = item.get("scale").filter(|scale| !matches!(scale.text(), Some("log" | "linear"))) {
-            self.fault(tree, &format!("{place}.scale"), scale.describe(), "\"linear\" or \"log\"");
-        }
-        match (low, high) {
-            (Some(low), Some(high)) if low < high && (!log || low > 0.0) && (high - low).is_finite() => {
-                Some(Levels::Between { low, high, log })
-            }
-            (Some(low), Some(high)) => {
-                let allowed = if log { "from greater than 0 and less than to" } else { "from less than to" };
-                self.fault(tree, place, format!("from {low} to {high}"), allowed);
-                None
-            }
-            _ => {
-                self.fault(tree, place, format!("an empty axis \"{setting}\""), "values = [...], or from and to as numbers");
-                None
-            }
-        }
-    }
 }

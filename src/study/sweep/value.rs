@@ -10,6 +10,8 @@ use crate::document::{Node, Value as Read};
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(untagged)]
 pub enum Value {
+    /// None: what the setting is without the axis that this is a value of.
+    Unset,
     /// True or false.
     Truth(bool),
     /// A whole number.
@@ -60,6 +62,7 @@ impl Value {
 impl fmt::Display for Value {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
+            Self::Unset => f.write_str("-"),
             Self::Truth(b) => b.fmt(f),
             Self::Whole(n) => n.fmt(f),
             Self::Real(x) => x.fmt(f),

@@ -1,11 +1,12 @@
-//! Curves over the levels of one axis, one for each level of the compared one, with intervals.
+//! Curves over the levels of one axis, with intervals: what shares and ratios do as something gets worse.
 
+use svg::Document;
 use svg::node::element::{Circle, Group, Polyline};
 
-use super::heat::{WIDTH_PX, document};
-use crate::draw::chart::{FAINT_INK, INK, SERIES, line, px, text};
-use crate::study::sweep::duels::Scale;
+use crate::draw::chart::{FAINT_INK, INK, SERIES, line, px, rectangle, text};
 
+/// Width of a figure, px: that of a phone, where it is shown as it is; on a desk several stand side by side.
+pub(super) const WIDTH_PX: f64 = 360.0;
 /// The plot, px: left, top, right, bottom.
 const PLOT_PX: [f64; 4] = [44.0, 34.0, WIDTH_PX - 8.0, 222.0];
 /// How far the curves stand aside of one another, px.
@@ -26,8 +27,16 @@ pub(super) enum Unit {
     Ratio,
 }
 
-/// Draws curves over the levels of `x`.
-pub(super) fn curves(title: &str, x: &Scale, unit: Unit, curves: &[Curve]) -> String {
+/// An empty white figure.
+pub(super) fn document([width, height]: [f64; 2]) -> Document {
+    Document::new()
+        .set("viewBox", format!("0 0 {} {}", px(width), px(height)))
+        .set("font-family", "Helvetica, Arial, 'Liberation Sans', 'DejaVu Sans', sans-serif")
+        .add(rectangle([0.0, 0.0, width, height]).set("fill", "#ffffff"))
+}
+
+/// Curves over the levels of the axis that `label` names, and how high the drawing is, px.
+pub(super) fn curves(title: &str, (label, levels): (&str, &[String]), unit: Unit, curves: &[Curve]) -> (Group, f64) {
     let [left, top, right, bottom] = PLOT_PX;
     let ticks = match unit {
         Unit::Percent => vec![0.0, 0.25, 0.5, 0.75, 1.0],
@@ -35,10 +44,10 @@ pub(super) fn curves(title: &str, x: &Scale, unit: Unit, curves: &[Curve]) -> St
     };
     let (low, high) = (ticks[0], ticks[ticks.len() - 1]);
     let y_of = |value: f64| bottom - (bottom - top) * ((value - low) / (high - low)).clamp(0.0, 1.0);
-    let step = (right - left) / x.levels.len() as f64;
+    let step = (right - left) / levels.len() as f64;
     let columns = 2;
     let height = bottom + 48.0 + 17.0 * curves.len().div_ceil(columns) as f64;
-    let mut page = document(height).add(text(title, 4.0, 18.0, 14.0).set("font-weight", "bold").set("fill", INK));
+    let mut page = Group::new().add(text(title, 4.0, 18.0, 14.0).set("font-weight", "bold").set("fill", INK));
     for tick in &ticks {
         let at = y_of(*tick);
         let label = if unit == Unit::Percent { format!("{:.0} %", 100.0 * tick) } else { format!("{tick}") };
@@ -47,13 +56,13 @@ pub(super) fn curves(title: &str, x: &Scale, unit: Unit, curves: &[Curve]) -> St
             .add(text(&label, left - 6.0, at + 4.0, 11.0).set("text-anchor", "end").set("fill", FAINT_INK));
     }
     page = page.add(line([left, bottom], [right, bottom]).set("stroke", FAINT_INK));
-    let crowded = x.levels.iter().any(|level| 6.4 * level.chars().count() as f64 > step);
-    for (k, level) in x.levels.iter().enumerate() {
+    let crowded = levels.iter().any(|level| 6.4 * level.chars().count() as f64 > step);
+    for (k, level) in levels.iter().enumerate() {
         let at = left + step * (k as f64 + 0.5);
         let drop = if crowded && k % 2 == 1 { 26.0 } else { 15.0 };
         page = page.add(text(level, at, bottom + drop, 11.0).set("text-anchor", "middle").set("fill", INK));
     }
-    let name = text(&x.label, 0.5 * (left + right), bottom + if crowded { 41.0 } else { 33.0 }, 12.0);
+    let name = text(label, 0.5 * (left + right), bottom + if crowded { 41.0 } else { 33.0 }, 12.0);
     page = page.add(name.set("text-anchor", "middle").set("fill", FAINT_INK));
     for (k, curve) in curves.iter().enumerate() {
         let aside = ASIDE_PX * (k as f64 - 0.5 * (curves.len() - 1) as f64);
@@ -68,7 +77,7 @@ pub(super) fn curves(title: &str, x: &Scale, unit: Unit, curves: &[Curve]) -> St
             .add(sample.set("stroke", SERIES[k % SERIES.len()]).set("stroke-width", 2.4))
             .add(text(&curve.label, corner[0] + 24.0, corner[1], 12.0).set("fill", INK));
     }
-    page.to_string() + "\n"
+    (page, height)
 }
 
 fn draw(curve: &Curve, colour: &str, x: &dyn Fn(usize) -> f64, y: &dyn Fn(f64) -> f64) -> Group {

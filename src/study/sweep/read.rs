@@ -1,0 +1,298 @@
+//! Reading a study file: its tree becomes a study, or all of its faults come at once.
+
+use std::ops::RangeInclusive;
+use std::path::{Path, PathBuf};
+
+use strum::VariantArray;
+
+use super::design::{Design, SOBOL_AXES};
+use super::settings;
+use super::spec::{Axis, Levels, MOST_EPISODES, Study};
+use super::value::Value;
+use crate::document::{Node, Value as Read};
+use crate::episode::Setup;
+use crate::error::{Error, Result};
+use crate::fault::Fault;
+use crate::render::RendererChoice;
+use crate::world::Draft;
+
+/// Reads the file's tree and gathers its faults.
+pub(super) struct Reader<'a> {
+    source: &'a Path,
+    faults: Vec<Fault>,
+}
+
+/// Fields of the file, and of an axis.
+const FIELDS: [&str; 10] = ["name", "description", "world", "seed", "seeds", "design", "points", "settings", "axes", "compare"];
+const AXIS_FIELDS: [&str; 6] = ["setting", "label", "values", "from", "to", "scale"];
+
+impl<'a> Reader<'a> {
+    pub fn new(source: &'a Path) -> Self {
+        Self { source, faults: Vec::new() }
+    }
+
+    /// The study, if it has no faults. Whether its settings go together is not checked.
+    ///
+    /// # Errors
+    /// All faults that can be found at once.
+    pub fn read(mut self, tree: &Node, text: &str, seeds: Option<RangeInclusive<u64>>) -> Result<Study> {
+        match self.study(tree, text, seeds) {
+            Some(study) if self.faults.is_empty() => Ok(study),
+            _ => Err(self.error()),
+        }
+    }
+
+    fn error(self) -> Error {
+        let mut faults = self.faults;
+        faults.sort_by_key(|f| f.line);
+        Error::World { path: self.source.to_owned(), faults }
+    }
+
+    fn fault(&mut self, tree: &Node, place: &str, found: impl Into<String>, allowed: impl Into<String>) {
+        let line = tree.locate(place).0;
+        let (place, found, allowed) = (place.to_owned(), found.into(), allowed.into());
+        self.faults.push(Fault { place, found, allowed, owner: None, line });
+    }
+
+    fn study(&mut self, tree: &Node, text: &str, seeds: Option<RangeInclusive<u64>>) -> Option<Study> {
+        self.known(tree, tree, "", &FIELDS);
+        let name = self.text(tree, "name")?.to_owned();
+        if name.is_empty() || !name.chars().all(|c| c.is_alphanumeric() || "-_".contains(c)) {
+            self.fault(tree, "name", format!("\"{name}\""), "letters, digits, - and _");
+        }
+        let world = self.world(tree)?;
+        let world_sha256 = match Draft::open(&world).and_then(|draft| draft.world()) {
+            Ok(world) => world.sha256,
+            Err(error) => {
+                self.fault(tree, "world", format!("\"{world}\""), error.to_string());
+                return None;
+            }
+        };
+        let seeds = match seeds {
+            Some(seeds) => seeds,
+            None => self.seeds(tree)?,
+        };
+        let design = match tree.get("design") {
+            None => Design::Grid,
+            Some(node) => match node.text().and_then(|name| name.parse().ok()) {
+                Some(design) => design,
+                None => {
+                    let names: Vec<String> = Design::VARIANTS.iter().map(|design| format!("\"{design}\"")).collect();
+                    self.fault(tree, "design", node.describe(), format!("one of {}", names.join(", ")));
+                    return None;
+                }
+            },
+        };
+        let settings = self.settings(tree);
+        let axes = self.axes(tree);
+        let points = self.points(tree, design, &axes)?;
+        let seed = self.whole(tree, "seed", 0)?;
+        let compare = tree.get("compare").and_then(Node::text).unwrap_or("method").to_owned();
+        if tree.get("compare").is_some() && !axes.iter().any(|axis| axis.setting == compare) {
+            self.fault(tree, "compare", format!("\"{compare}\""), "the setting of an axis");
+        }
+        let description = tree.get("description").and_then(Node::text).unwrap_or_default().to_owned();
+        let text = text.to_owned();
+        // The CPU, so that rows are the same on a machine with a graphics card.
+        let base = Setup { renderer: RendererChoice::Cpu, ..Setup::default() };
+        let study =
+            Study { name, description, world, world_sha256, seed, seeds, design, points, settings, axes, compare, text, base };
+        match study.points.saturating_mul(study.combinations()).saturating_mul(study.episodes_per_cell()) {
+            0 if !study.axes.is_empty() => {
+                self.fault(tree, "axes", "nothing but the compared axis", "an axis beside it that takes its turn");
+                None
+            }
+            1..=MOST_EPISODES => Some(study),
+            _ => {
+                self.fault(tree, "axes", "more episodes than that", format!("{MOST_EPISODES} episodes at most"));
+                None
+            }
+        }
+    }
+
+    /// Refuses fields that there are not.
+    fn known(&mut self, tree: &Node, table: &Node, place: &str, fields: &[&str]) {
+        let Read::Table(entries) = &table.value else { return };
+        for (key, _) in entries.iter().filter(|(key, _)| !fields.contains(&key.as_str())) {
+            let place = if place.is_empty() { key.clone() } else { format!("{place}.{key}") };
+            self.fault(tree, &place, "an unknown field", format!("one of {}", fields.join(", ")));
+        }
+    }
+
+    fn text<'n>(&mut self, tree: &'n Node, field: &str) -> Option<&'n str> {
+        let text = tree.get(field).and_then(Node::text);
+        if text.is_none() {
+            let found = tree.get(field).map_or_else(|| "nothing".to_owned(), Node::describe);
+            self.fault(tree, field, found, "a text in quotes, which must be given");
+        }
+        text
+    }
+
+    fn whole(&mut self, tree: &Node, field: &str, usual: u64) -> Option<u64> {
+        let Some(node) = tree.get(field) else { return Some(usual) };
+        let number = if let Read::Integer(n) = node.value { u64::try_from(n).ok() } else { None };
+        if number.is_none() {
+            self.fault(tree, field, node.describe(), "a whole number from 0");
+        }
+        number
+    }
+
+    /// A world file beside the study file, or what `World::open` takes.
+    fn world(&mut self, tree: &Node) -> Option<String> {
+        let given = self.text(tree, "world")?;
+        let beside: PathBuf = self.source.parent().unwrap_or(Path::new("")).join(given);
+        Some(if beside.is_file() { beside.to_string_lossy().into_owned() } else { given.to_owned() })
+    }
+
+    fn seeds(&mut self, tree: &Node) -> Option<RangeInclusive<u64>> {
+        let node = tree.get("seeds");
+        let range = node.and_then(Node::text).and_then(|text| {
+            let (first, last) = text.split_once("..")?;
+            let (first, last) = (first.parse::<u64>().ok()?, last.trim_start_matches('=').parse::<u64>().ok()?);
+            (first <= last && last - first < MOST_EPISODES && last <= i64::MAX as u64).then_some(first..=last)
+        });
+        if range.is_none() {
+            let found = node.map_or_else(|| "nothing".to_owned(), Node::describe);
+            self.fault(tree, "seeds", found, "\"A..B\", both included, the first not above the last, which must be given");
+        }
+        range
+    }
+
+    fn points(&mut self, tree: &Node, design: Design, axes: &[Axis]) -> Option<u64> {
+        let sampled = axes.iter().filter(|axis| axis.levels.listed().is_empty()).count();
+        if matches!(design, Design::Grid | Design::OneAtATime) {
+            if tree.get("points").is_some() {
+                self.fault(tree, "points", format!("points of design \"{design}\""), "none: it has its axes' levels");
+            }
+            if let Some(k) = axes.iter().position(|axis| axis.levels.listed().is_empty()) {
+                let (place, found) = (format!("axes[{k}]"), format!("from and to in design \"{design}\""));
+                self.fault(tree, &place, found, "values, or design = \"random\" or \"sobol\"");
+            }
+            return Some(1);
+        }
+        if sampled == 0 {
+            self.fault(tree, "design", "no axis with from and to", "at least one in a random or Sobol design");
+        }
+        if design == Design::Sobol && sampled > SOBOL_AXES {
+            self.fault(tree, "design", format!("{sampled} axes with from and to"), format!("{SOBOL_AXES} at most"));
+        }
+        let points = self.whole(tree, "points", 0)?;
+        if points == 0 || points > 1 << 31 {
+            self.fault(tree, "points", points.to_string(), "a whole number from 1 to 2147483648");
+        }
+        Some(points.max(1))
+    }
+
+    fn settings(&mut self, tree: &Node) -> Vec<(String, Value)> {
+        let mut found = Vec::new();
+        match tree.get("settings").map(|node| &node.value) {
+            None => {}
+            Some(Read::Table(entries)) => {
+                for (key, node) in entries {
+                    self.setting(tree, key, node, &mut found);
+                }
+            }
+            Some(_) => self.fault(tree, "settings", "no table", "[settings] with a setting a line"),
+        }
+        found
+    }
+
+    /// A setting, or a table of settings that begin with the same words.
+    fn setting(&mut self, tree: &Node, name: &str, node: &Node, found: &mut Vec<(String, Value)>) {
+        if let Read::Table(entries) = &node.value {
+            let inner = |key: &str| format!("{name}.{key}");
+            // A table is a value of its own only in a list's entry, whose shape or texture is set as a whole.
+            if !settings::exists(name) || settings::has_parts(name) {
+                entries.iter().for_each(|(key, node)| self.setting(tree, &inner(key), node, found));
+                return;
+            }
+        }
+        match Value::read(node) {
+            _ if !settings::exists(name) => {
+                let (found, allowed) = ("no setting".to_owned(), settings::near(name));
+                self.faults.push(Fault { place: format!("settings.{name}"), found, allowed, owner: None, line: node.line });
+            }
+            Some(value) => found.push((name.to_owned(), value)),
+            None => self.fault(tree, &format!("settings.{name}"), node.describe(), "a number, a text, a list or a table"),
+        }
+    }
+
+    fn axes(&mut self, tree: &Node) -> Vec<Axis> {
+        let Some(node) = tree.get("axes") else {
+            self.fault(tree, "axes", "nothing", "[[axes]], at least one");
+            return Vec::new();
+        };
+        let Read::List(items) = &node.value else {
+            self.fault(tree, "axes", node.describe(), "[[axes]], at least one");
+            return Vec::new();
+        };
+        if items.is_empty() {
+            self.fault(tree, "axes", "an empty list", "at least one axis");
+        }
+        let mut axes: Vec<Axis> = Vec::new();
+        for (k, item) in items.iter().enumerate() {
+            let place = format!("axes[{k}]");
+            self.known(tree, item, &place, &AXIS_FIELDS);
+            let Some(setting) = item.get("setting").and_then(Node::text) else {
+                let found = item.get("setting").map_or_else(|| "nothing".to_owned(), Node::describe);
+                self.fault(tree, &format!("{place}.setting"), found, "the name of a setting in quotes");
+                continue;
+            };
+            if !settings::exists(setting) {
+                self.fault(tree, &format!("{place}.setting"), format!("\"{setting}\""), settings::near(setting));
+            }
+            if axes.iter().any(|axis| axis.setting == setting) {
+                self.fault(tree, &format!("{place}.setting"), format!("\"{setting}\" again"), "one axis a setting");
+            }
+            let Some(levels) = self.levels(tree, item, &place, setting) else { continue };
+            let label = item.get("label").and_then(Node::text).unwrap_or(setting).to_owned();
+            axes.push(Axis { setting: setting.to_owned(), label, levels });
+        }
+        axes
+    }
+
+    fn levels(&mut self, tree: &Node, item: &Node, place: &str, setting: &str) -> Option<Levels> {
+        if let Some(node) = item.get("values") {
+            let place = format!("{place}.values");
+            let Read::List(nodes) = &node.value else {
+                self.fault(tree, &place, node.describe(), "a list of values");
+                return None;
+            };
+            if nodes.is_empty() {
+                self.fault(tree, &place, format!("an empty list for axis \"{setting}\""), "at least one value");
+                return None;
+            }
+            let mut values = Vec::new();
+            for node in nodes {
+                match Value::read(node) {
+                    Some(value) if values.contains(&value) => {
+                        self.fault(tree, &place, format!("{value} twice"), "each value once");
+                    }
+                    Some(value) => values.push(value),
+                    None => self.fault(tree, &place, node.describe(), "numbers, texts, lists or tables"),
+                }
+            }
+            return Some(Levels::Listed(values));
+        }
+        let number = |field: &str| item.get(field).and_then(Value::read).and_then(|value| value.number());
+        let (low, high) = (number("from"), number("to"));
+        let log = item.get("scale").and_then(Node::text) == Some("log");
+        if let Some(scale) = item.get("scale").filter(|scale| !matches!(scale.text(), Some("log" | "linear"))) {
+            self.fault(tree, &format!("{place}.scale"), scale.describe(), "\"linear\" or \"log\"");
+        }
+        match (low, high) {
+            (Some(low), Some(high)) if low < high && (!log || low > 0.0) && (high - low).is_finite() => {
+                Some(Levels::Between { low, high, log })
+            }
+            (Some(low), Some(high)) => {
+                let allowed = if log { "from greater than 0 and less than to" } else { "from less than to" };
+                self.fault(tree, place, format!("from {low} to {high}"), allowed);
+                None
+            }
+            _ => {
+                self.fault(tree, place, format!("an empty axis \"{setting}\""), "values = [...], or from and to as numbers");
+                None
+            }
+        }
+    }
+}
