@@ -45,9 +45,11 @@ struct Checked<'a> {
     source: String,
     sha256: &'a str,
     walls: usize,
+    inner_walls: usize,
     landmarks: usize,
     obstacles: usize,
     starts: usize,
+    warnings: Vec<String>,
 }
 
 pub fn run(args: &WorldArgs, context: &Context) -> Result<Verdict> {
@@ -72,14 +74,21 @@ fn check(world: &World, context: &Context) -> Result<()> {
         source: world.source.display().to_string(),
         sha256: &world.sha256,
         walls: world.outline.len(),
+        inner_walls: world.partitions.len(),
         landmarks: world.landmark_count,
         obstacles: world.bodies.len() - world.landmark_count,
         starts: world.spec.start.named.len(),
+        warnings: world.warnings.iter().map(ToString::to_string).collect(),
     };
     context.print(&checked, || {
-        format!(
-            "OK: {} ({}): {} walls, {} landmarks, {} obstacles, {} named starts\n",
-            checked.name, checked.source, checked.walls, checked.landmarks, checked.obstacles, checked.starts
-        )
+        let Checked { name, source, walls, inner_walls, landmarks, obstacles, starts, .. } = &checked;
+        let inner = if *inner_walls > 0 { format!("{inner_walls} inner walls, ") } else { String::new() };
+        let mut text = format!(
+            "OK: {name} ({source}): {walls} walls, {inner}{landmarks} landmarks, {obstacles} obstacles, {starts} named starts\n"
+        );
+        for warning in &checked.warnings {
+            text += &format!("warning: {warning}\n");
+        }
+        text
     })
 }

@@ -12,10 +12,10 @@ use super::chassis::PlanarVelocity;
 use super::hull::{HULL_FRICTION, HULL_RESTITUTION};
 use super::movers::is_solid;
 use super::slide::SlidingBody;
-use super::{Struck, Touched, solid_stretches};
+use super::{Stretches, Struck, Touched};
 use crate::geometry::{Pose, Vector2, atan2, sin_cos};
-use crate::world::polygon::{contains, edges, segments_cross};
-use crate::world::{Footprint, MotionSpec, World};
+use crate::world::polygon::{bounds, contains, edges, segments_cross};
+use crate::world::{Boundary, Footprint, MotionSpec, World};
 
 /// Size of what moves, m. Rapier's tolerances scale with it: contacts may sink in by 0.5 mm and are foreseen at `TOUCH_GAP_M`.
 const LENGTH_UNIT_M: f32 = 0.1;
@@ -74,11 +74,11 @@ impl Arena {
 
         let (friction, restitution) = (HULL_FRICTION as f32, HULL_RESTITUTION as f32);
         let hard = |shape: ColliderBuilder| shape.friction(friction).restitution(restitution).density(0.0);
-        for (k, [a, b, apex]) in walls(&world.outline).enumerate() {
+        for (k, [a, b, apex]) in walls(&world.outline, world.boundary()).enumerate() {
             let wall = hard(ColliderBuilder::triangle(vector(a), vector(b), vector(apex)));
             physics.insert_collider(wall.user_data(mark(Struck::Wall(k))), None);
         }
-        for (k, corners) in solid_stretches(world) {
+        for (k, corners) in Stretches::new(world).all {
             let wall = hard(shape(&Footprint::Polygon(corners.to_vec())));
             physics.insert_collider(wall.user_data(mark(Struck::Partition(k))), None);
         }
@@ -239,14 +239,14 @@ fn struck(mark: u128) -> Struck {
 
 /// Solid walls: a triangle behind each edge of the room, its apex outside. Triangles have no overhang, so with an apex close
 /// enough they fit behind any edge, beside sharp reflex corners and in thin partitions too.
-fn walls(outline: &[Vector2<f64>]) -> impl Iterator<Item = [Vector2<f64>; 3]> + '_ {
+fn walls<'a>(outline: &'a [Vector2<f64>], boundary: &'a Boundary) -> impl Iterator<Item = [Vector2<f64>; 3]> + 'a {
     edges(outline).map(|(a, b)| {
         let along = b - a;
         let outwards = Vector2::new(along.y, -along.x) / along.norm();
         let middle = (a + b) * 0.5;
         let mut depth = WALL_DEPTH_M;
         // Halving ends at a tenth of a micrometre at the latest, which is as good as a plane.
-        while depth > 1e-7 && !fits([a, b, middle + outwards * depth], outline) {
+        while depth > 1e-7 && !fits([a, b, middle + outwards * depth], boundary) {
             depth *= 0.5;
         }
         [a, b, middle + outwards * depth]
@@ -254,11 +254,13 @@ fn walls(outline: &[Vector2<f64>]) -> impl Iterator<Item = [Vector2<f64>; 3]> + 
 }
 
 /// Whether the triangle stays out of the room.
-fn fits(triangle: [Vector2<f64>; 3], outline: &[Vector2<f64>]) -> bool {
+fn fits(triangle: [Vector2<f64>; 3], boundary: &Boundary) -> bool {
     let [a, b, apex] = triangle;
-    let holds_corner = outline.iter().any(|&c| c != a && c != b && contains(&triangle, c));
-    let crosses = edges(outline).any(|(c, d)| segments_cross(a, apex, c, d) || segments_cross(b, apex, c, d));
-    !holds_corner && !crosses && !contains(outline, apex)
+    let (low, high) = bounds(&triangle);
+    let near: Vec<_> = boundary.walls_near(low, high).into_iter().map(|k| boundary.wall(k)).collect();
+    let holds_corner = near.iter().any(|&(c, _)| c != a && c != b && contains(&triangle, c));
+    let crosses = near.iter().any(|&(c, d)| segments_cross(a, apex, c, d) || segments_cross(b, apex, c, d));
+    !holds_corner && !crosses && !boundary.contains(apex)
 }
 
 fn shape(footprint: &Footprint) -> ColliderBuilder {
@@ -301,7 +303,9 @@ mod tests {
             [[0.0, 0.0], [4.0, 0.0], [4.0, 3.0], [2.1, 3.0], [2.05, 0.5], [2.0, 3.0], [1.0, 3.0], [0.9, 2.0], [0.0, 2.1]];
         let outline: Vec<_> = corners.iter().map(|c| Vector2::new(c[0], c[1])).collect();
         let mut deepest: f64 = 0.0;
-        for [a, b, apex] in walls(&outline) {
+        let world = format!("name = \"test\"\nroom = {{ outline_m = {corners:?} }}\nhome = {{ x_m = 0.5, y_m = 0.5 }}");
+        let world = World::from_toml(&world, "test").unwrap();
+        for [a, b, apex] in walls(&outline, world.boundary()) {
             assert!(cross(b - a, apex - a) < 0.0);
             deepest = deepest.max(-cross(b - a, apex - a) / (b - a).norm());
             for k in 1..20 {

@@ -14,10 +14,11 @@
 
 use super::chassis::{Chassis, PlanarVelocity};
 use super::movers::is_solid;
-use super::{Struck, TOUCH_GAP_M, Touched, solid_stretches};
+use super::{Stretches, Struck, TOUCH_GAP_M, Touched};
 use crate::geometry::{Pose, Vector2, cross};
+use crate::world::grid::bounds_of;
 use crate::world::polygon::{closest_on_segment, contains, edges};
-use crate::world::{Footprint, World};
+use crate::world::{Boundary, Footprint, World};
 
 /// Coulomb friction of the robot's hull on walls and bodies.
 pub(super) const HULL_FRICTION: f64 = 0.3;
@@ -36,13 +37,12 @@ const CONVERGED_M_S: f64 = 1e-12;
 #[derive(Debug, Clone)]
 pub(super) struct Hull {
     radius: f64,
-    outline: Vec<Vector2<f64>>,
+    boundary: Boundary,
     /// For each corner of the outline whether it juts into the room.
     juts: Vec<bool>,
     /// Index in the world, footprint, and a circle around its origin that holds it.
     bodies: Vec<(usize, Footprint, f64)>,
-    /// What is solid of the walls inside the room: number of the wall and corners.
-    partitions: Vec<(usize, [Vector2<f64>; 4])>,
+    partitions: Stretches,
 }
 
 /// A place where the hull touches, or may within the substep.
@@ -69,9 +69,9 @@ impl Hull {
         Self {
             radius: robot.radius_m,
             juts: jutting(&world.outline),
-            outline: world.outline.clone(),
+            boundary: world.boundary().clone(),
             bodies: bodies.map(|(k, b)| (k, b.footprint.clone(), b.footprint.bounding_radius())).collect(),
-            partitions: solid_stretches(world).collect(),
+            partitions: Stretches::new(world),
         }
     }
 
@@ -124,7 +124,9 @@ impl Hull {
             let arm = axle - normal * self.radius;
             (gap <= reach(surface)).then(|| Contact { with, normal, gap, surface, arm, target: 0.0, impulse: Vector2::zeros() })
         };
-        let walls = self.walls_at(centre).into_iter().filter_map(|(k, at)| contact(Struck::Wall(k), Vector2::zeros(), at));
+        let still = reach(Vector2::zeros()) + self.radius;
+        let walls =
+            self.walls_at(centre, still).into_iter().filter_map(|(k, at)| contact(Struck::Wall(k), Vector2::zeros(), at));
         let bodies = self.bodies.iter().filter_map(|(k, footprint, bound)| {
             let surface = (after[*k].position() - before[*k].position()) / dt;
             if (before[*k].position() - centre).norm() - bound - self.radius > reach(surface) {
@@ -133,19 +135,21 @@ impl Hull {
             let (normal, distance) = footprint_at(footprint, before[*k].inverse_transform(centre));
             contact(Struck::Body(*k), surface, (before[*k].transform(normal) - before[*k].position(), distance))
         });
-        let partitions = self.partitions.iter();
+        let partitions = self.partitions.near(centre, still);
         let partitions =
             partitions.filter_map(|(k, corners)| contact(Struck::Partition(*k), Vector2::zeros(), polygon_at(corners, centre)));
         walls.chain(bodies).chain(partitions).collect()
     }
 
-    /// Normal and distance of `point` from each wall that faces it. Outside the room, where only a bad start can put the robot,
-    /// the nearest wall alone counts, with the distance negative.
-    fn walls_at(&self, point: Vector2<f64>) -> Vec<(usize, (Vector2<f64>, f64))> {
-        let walls = edges(&self.outline).enumerate();
-        if contains(&self.outline, point) {
+    /// Normal and distance of `point` from each wall that faces it, those at least that are within `reach`. Outside the room, where
+    /// only a bad start can put the robot, the nearest wall alone counts, with the distance negative.
+    fn walls_at(&self, point: Vector2<f64>, reach: f64) -> Vec<(usize, (Vector2<f64>, f64))> {
+        if self.boundary.contains(point) {
+            let (low, high) = bounds_of(&[point], reach);
+            let walls = self.boundary.walls_near(low, high).into_iter().map(|k| (k, self.boundary.wall(k)));
             return walls.filter_map(|(k, (a, b))| Some((k, wall(a, b, self.juts[k], point)?))).collect();
         }
+        let walls = (0..self.juts.len()).map(|k| (k, self.boundary.wall(k)));
         let nearest = walls.map(|(k, (a, b))| (k, closest_on_segment(point, a, b).0 - point));
         let nearest = nearest.min_by(|(_, a), (_, b)| a.norm_squared().total_cmp(&b.norm_squared()));
         let way_back = nearest.filter(|(_, way)| way.norm() > 0.0).map(|(k, way)| (k, (way / way.norm(), -way.norm())));

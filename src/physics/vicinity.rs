@@ -7,11 +7,10 @@
 //!
 //! Distances are not measured in every substep either: a gap of 1 m stays a gap until robot and bodies together have gone 1 m.
 
+use super::Stretches;
 use super::movers::is_solid;
-use super::solid_stretches;
 use crate::geometry::{Pose, Vector2};
-use crate::world::polygon::{distance_to_polygon, distance_to_segment, edges};
-use crate::world::{Body, Footprint, MotionSpec, World};
+use crate::world::{Body, Boundary, Footprint, MotionSpec, World};
 
 /// Gap below which rapier is asked, m: ten times the distance at which it foresees contacts.
 const MARGIN_M: f64 = 0.02;
@@ -19,9 +18,8 @@ const MARGIN_M: f64 = 0.02;
 /// What could be near the robot.
 #[derive(Debug, Clone)]
 pub(super) struct Vicinity {
-    walls: Vec<(Vector2<f64>, Vector2<f64>)>,
-    /// What is solid of the walls inside the room.
-    partitions: Vec<[Vector2<f64>; 4]>,
+    boundary: Boundary,
+    partitions: Stretches,
     /// Bodies that do not give way, with their index in the world.
     bodies: Vec<(usize, Footprint)>,
     /// Those of them that move by themselves.
@@ -87,8 +85,8 @@ impl Vicinity {
             }
         }
         Self {
-            walls: edges(&world.outline).collect(),
-            partitions: solid_stretches(world).map(|(_, corners)| corners).collect(),
+            boundary: world.boundary().clone(),
+            partitions: Stretches::new(world),
             bodies: solid().filter(|(_, b)| !b.can_be_pushed()).map(|(k, b)| (k, b.footprint.clone())).collect(),
             robot_radius: world.spec.robot.radius_m,
             movers,
@@ -142,9 +140,8 @@ impl Vicinity {
 
     /// Free space around the robot's hull, m.
     fn measure(&self, robot: Vector2<f64>, poses: &[Pose]) -> f64 {
-        let walls = self.walls.iter().map(|(a, b)| distance_to_segment(robot, *a, *b));
         let bodies = self.bodies.iter().map(|(k, footprint)| footprint.distance_to(poses[*k].inverse_transform(robot)));
-        let partitions = self.partitions.iter().map(|corners| distance_to_polygon(corners, robot));
-        walls.chain(bodies).chain(partitions).fold(f64::INFINITY, f64::min) - self.robot_radius
+        let walls = [self.boundary.distance(robot), self.partitions.distance(robot)];
+        walls.into_iter().chain(bodies).fold(f64::INFINITY, f64::min) - self.robot_radius
     }
 }

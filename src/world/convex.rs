@@ -6,6 +6,7 @@
 
 use crate::geometry::{Pose, Vector2};
 
+use super::grid::{Bounds, bounds_of};
 use super::polygon::{contains, distance_to_segment, edges};
 use super::{Body, Footprint};
 
@@ -54,6 +55,17 @@ impl Convex {
     #[must_use]
     pub fn gap_m(&self, other: &Self) -> f64 {
         core_gap(&self.core, &other.core) - self.radius_m - other.radius_m
+    }
+
+    /// Whether it could meet a disc; where it could not, it is told by the box around it.
+    pub(crate) fn may_reach(&self, centre: Vector2<f64>, radius_m: f64) -> bool {
+        let (low, high) = self.bounds(radius_m);
+        low.x <= centre.x && centre.x <= high.x && low.y <= centre.y && centre.y <= high.y
+    }
+
+    /// The box around the shape, grown by `margin_m` on all sides.
+    pub(crate) fn bounds(&self, margin_m: f64) -> Bounds {
+        bounds_of(&self.core, self.radius_m + margin_m)
     }
 
     /// Mean of the core's corners: a point inside the shape, m.

@@ -4,8 +4,8 @@ use std::f64::consts::{PI, TAU};
 
 use rand_pcg::rand_core::Rng;
 
-use super::convex::{Convex, gap_to_walls_m};
-use super::polygon::{anticlockwise, bounds, contains, distance_to_boundary};
+use super::convex::Convex;
+use super::polygon::{anticlockwise, bounds, contains};
 use super::{Body, Footprint, Partition, World};
 use crate::error::{Error, Result};
 use crate::geometry::{Pose, Vector2};
@@ -36,10 +36,10 @@ impl World {
     /// Where the camera is, in words: `outside the room`, "inside `desk`".
     pub fn camera_is_free(&self, pose: &Pose) -> std::result::Result<(), String> {
         let (camera, height_m) = (self.camera_pose(pose).position(), self.spec.camera.height_m);
-        if !contains(&self.outline, camera) {
+        if !self.boundary.contains(camera) {
             return Err("outside the room".into());
         }
-        if distance_to_boundary(&self.outline, camera) < IN_WALL_M {
+        if self.boundary.distance(camera) < IN_WALL_M {
             return Err("in a wall of the room".into());
         }
         let at_its_height = self.bodies.iter().filter(|b| b.bottom_m <= height_m && height_m <= b.top_m);
@@ -47,7 +47,8 @@ impl World {
         let is_in = |stretch: &[f64; 2], wall: &Partition| {
             Footprint::Polygon(wall.footprint(*stretch).into()).distance_to(camera) < IN_WALL_M
         };
-        let wall = self.partitions.iter().find(|wall| wall.stretches(height_m, height_m).iter().any(|s| is_in(s, wall)));
+        let mut walls = self.partitions_near(camera, camera).into_iter().map(|k| &self.partitions[k]);
+        let wall = walls.find(|wall| wall.stretches(height_m, height_m).iter().any(|s| is_in(s, wall)));
         match body.map(|b| &b.name).or(wall.map(|w| &w.name)) {
             Some(name) => Err(format!("inside `{name}`")),
             None => Ok(()),
@@ -70,23 +71,26 @@ impl World {
         shape: &Convex,
         bodies: impl Iterator<Item = (&'a Body, &'a Pose)>,
     ) -> std::result::Result<(), String> {
-        if !contains(&self.outline, shape.middle()) {
+        if !self.boundary.contains(shape.middle()) {
             return Err("the outside of the room".to_owned());
         }
-        for k in 0..self.outline.len() {
+        let (low, high) = shape.bounds(0.0);
+        for k in self.boundary.walls_near(low, high) {
             let (a, b) = self.wall(k);
             if shape.gap_m(&Convex::corridor(a, b, 0.0)) < 0.0 {
                 return Err(format!("wall {k}"));
             }
         }
-        for partition in &self.partitions {
+        for k in self.partitions_near(low, high) {
+            let partition = &self.partitions[k];
             let mut stretches = partition.stretches(0.0, self.spec.robot.height_m).into_iter();
             if stretches.any(|s| shape.gap_m(&Convex::polygon(&partition.footprint(s), 0.0)) < 0.0) {
                 return Err(partition.name.clone());
             }
         }
         for (body, pose) in bodies {
-            if body.bottom_m < self.spec.robot.height_m && shape.gap_m(&Convex::of_body(body, pose)) < 0.0 {
+            let close = shape.may_reach(pose.position(), body.footprint.bounding_radius());
+            if close && body.bottom_m < self.spec.robot.height_m && shape.gap_m(&Convex::of_body(body, pose)) < 0.0 {
                 return Err(body.name.clone());
             }
         }
@@ -102,7 +106,7 @@ impl World {
     /// Distance from `point` to the nearest wall, m; minus infinity outside the room.
     #[must_use]
     pub fn distance_to_walls_m(&self, point: Vector2<f64>) -> f64 {
-        gap_to_walls_m(&self.outline, &Convex::disc(point, 0.0))
+        if self.boundary.contains(point) { self.boundary.distance(point) } else { f64::NEG_INFINITY }
     }
 
     /// Coulomb friction of the floor at a point: that of the last zone around it, else the floor's own.

@@ -5,15 +5,17 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 use sha2::{Digest, Sha256};
 
+use super::grid::Grid;
 use super::picture::{Gallery, Pictures};
 use super::polygon::{anticlockwise, signed_area};
+use super::repeats;
 use super::robot::{RobotPreset, RobotSpec};
 use super::spec::{BodySpec, CameraPreset, ShapeSpec, WallSpec, WindowSpec, WorldSpec};
 use super::structure::{self, Findings};
 use super::texture::Texture;
 use super::validate;
 use super::wall::{Partition, pieces};
-use super::{Body, Footprint, Window, World, Zone};
+use super::{Body, Boundary, Footprint, Window, World, Zone};
 use crate::document::Node;
 use crate::error::{Error, Result};
 use crate::fault::Fault;
@@ -133,7 +135,12 @@ impl World {
             let (pictures, missing) = load_pictures(&spec, path);
             faults.extend(missing);
             if faults.is_empty() && not_finite.is_empty() {
-                return Ok(Self::resolve(spec, path, sha256(text, &pictures), &pictures));
+                let mut world = Self::resolve(spec, path, sha256(text, &pictures), &pictures);
+                world.warnings = repeats::warnings(&world);
+                for warning in &mut world.warnings {
+                    (warning.line, warning.owner) = as_read.locate(&warning.place);
+                }
+                return Ok(world);
             }
         }
         faults.extend(not_finite);
@@ -155,7 +162,8 @@ impl World {
             .map(|k| {
                 // A clockwise outline is turned round; its walls keep the textures that they have in the file.
                 let as_written = if clockwise { outline.len() - 1 - k } else { k };
-                Texture::new(&walls[as_written % walls.len()], seed(10 + as_written as u64), pictures)
+                let length_m = (outline[(k + 1) % outline.len()] - outline[k]).norm();
+                Texture::new(&walls[as_written % walls.len()], length_m, seed(10 + as_written as u64), pictures)
             })
             .collect();
         let first_body = INSTANCE_FIRST_WALL + outline.len() as u16;
@@ -164,13 +172,14 @@ impl World {
             .iter()
             .chain(&spec.obstacles)
             .enumerate()
-            .map(|(k, b)| Body {
+            .map(|(k, b)| (k, b, footprint(b)))
+            .map(|(k, b, footprint)| Body {
                 name: b.name.clone(),
-                footprint: footprint(b),
                 pose: Pose::new(b.position_m[0], b.position_m[1], b.heading_deg.to_radians()),
                 bottom_m: b.elevation_m,
                 top_m: b.elevation_m + b.height_m,
-                texture: Texture::new(&b.texture, seed(100 + k as u64), pictures),
+                texture: Texture::new(&b.texture, footprint.girth_m(), seed(100 + k as u64), pictures),
+                footprint,
                 glow: b.glow,
                 motion: b.motion.clone(),
                 instance: first_body + k as u16,
@@ -188,7 +197,7 @@ impl World {
                 bottom_m: w.height_m[0],
                 top_m: w.height_m[1],
                 // Far from the bodies' seeds, so that a further body changes no window.
-                texture: Texture::new(&w.texture, seed(u64::MAX / 2 + k as u64), pictures),
+                texture: Texture::new(&w.texture, w.along_m[1] - w.along_m[0], seed(u64::MAX / 2 + k as u64), pictures),
                 brightness: w.brightness,
                 instance: first_window + k as u16,
             })
@@ -198,17 +207,19 @@ impl World {
         let partitions = partitions.map(|(k, w)| {
             // Far from all others' seeds, for the same reason.
             let texture = w.texture.as_ref().unwrap_or(&walls[0]);
-            let texture = Texture::new(texture, seed(u64::MAX / 4 + k as u64), pictures);
+            // Faces across openings take up as much of the texture as the wall is thick.
+            let length_m = w.length_m() + 2.0 * w.thickness_m;
+            let texture = Texture::new(texture, length_m, seed(u64::MAX / 4 + k as u64), pictures);
             partition(w, k, spec.room.height_m, texture, first_partition.wrapping_add(k as u16))
         });
         let partitions = partitions.collect();
         let zones =
             spec.floor.zones.iter().map(|z| Zone { polygon: anticlockwise(&z.polygon_m), friction: z.friction }).collect();
         let home = Pose::new(spec.home.x_m, spec.home.y_m, spec.home.heading_deg.to_radians());
-        Self {
+        let mut world = Self {
             wall_textures,
-            floor_texture: Texture::new(&spec.room.floor, seed(1), pictures),
-            ceiling_texture: Texture::new(&spec.room.ceiling, seed(2), pictures),
+            floor_texture: Texture::new(&spec.room.floor, 0.0, seed(1), pictures),
+            ceiling_texture: Texture::new(&spec.room.ceiling, 0.0, seed(2), pictures),
             landmark_count: spec.landmarks.len(),
             outline,
             bodies,
@@ -218,8 +229,13 @@ impl World {
             home,
             source: source.to_owned(),
             sha256,
+            warnings: Vec::new(),
+            boundary: Boundary::default(),
+            partition_grid: Grid::default(),
             spec,
-        }
+        };
+        world.index();
+        world
     }
 }
 
@@ -268,8 +284,8 @@ fn partition(wall: &WallSpec, k: usize, room_height_m: f64, texture: Texture, in
         length_m,
         thickness_m: wall.thickness_m,
         pieces: pieces(wall, wall.height_m.unwrap_or(room_height_m)),
+        left_rise_m: if texture.fitted { 0.5 * texture.period_m[1] } else { 0.0 },
         texture,
-        left_rise_m: 0.0,
         instance,
     }
 }

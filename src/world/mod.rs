@@ -7,14 +7,17 @@
 //!
 //! Knows of: geometry, panoramas' projections and located documents. Must not know of rapier, wgpu or anything that moves.
 
+mod boundary;
 mod camera;
 pub mod convex;
 mod draft;
 mod free;
+pub(crate) mod grid;
 mod light;
 mod load;
 mod picture;
 pub mod polygon;
+mod repeats;
 pub mod robot;
 pub mod spec;
 mod structure;
@@ -24,10 +27,13 @@ mod wall;
 
 use std::path::PathBuf;
 
+use crate::fault::Warning;
 use crate::geometry::{Pose, Vector2};
 use crate::panorama::{INSTANCE_CEILING, INSTANCE_FIRST_WALL, INSTANCE_FLOOR, Projection};
+pub use boundary::Boundary;
 pub use camera::{CameraPreset, OpticsSpec};
 pub use draft::Draft;
+use grid::{Bounds, Grid, bounds_of};
 pub use light::LightPreset;
 pub use picture::Picture;
 pub use robot::RobotSpec;
@@ -66,6 +72,12 @@ pub struct World {
     pub zones: Vec<Zone>,
     /// Home pose.
     pub home: Pose,
+    /// What is allowed in the file and may still not be meant.
+    pub warnings: Vec<Warning>,
+    /// The outline, to be asked.
+    boundary: Boundary,
+    /// Partitions by place.
+    partition_grid: Grid,
 }
 
 /// Footprint of a body around its own origin.
@@ -84,6 +96,15 @@ impl Footprint {
         match self {
             Self::Disc(radius) => (point.norm() - radius).max(0.0),
             Self::Polygon(corners) => polygon::distance_to_polygon(corners, point),
+        }
+    }
+
+    /// Length of its outline, m.
+    #[must_use]
+    pub fn girth_m(&self) -> f64 {
+        match self {
+            Self::Disc(radius) => std::f64::consts::TAU * radius,
+            Self::Polygon(corners) => polygon::edges(corners).map(|(a, b)| (b - a).norm()).sum(),
         }
     }
 
@@ -167,6 +188,25 @@ impl World {
     #[must_use]
     pub fn landmarks(&self) -> &[Body] {
         &self.bodies[..self.landmark_count]
+    }
+
+    /// The outline, to be asked what is inside and which walls are near.
+    #[must_use]
+    pub fn boundary(&self) -> &Boundary {
+        &self.boundary
+    }
+
+    /// Numbers of walls inside the room that may meet the box from `low` to `high`, rising: all that do, and others.
+    #[must_use]
+    pub fn partitions_near(&self, low: Vector2<f64>, high: Vector2<f64>) -> Vec<usize> {
+        self.partition_grid.near((low, high))
+    }
+
+    /// Puts boundary and partitions where they are looked up.
+    fn index(&mut self) {
+        self.boundary = Boundary::new(&self.outline);
+        let boxes: Vec<Bounds> = self.partitions.iter().map(|p| bounds_of(&p.footprint([0.0, p.length_m]), 0.0)).collect();
+        self.partition_grid = Grid::new(&boxes);
     }
 
     /// Instance id of wall `k`.

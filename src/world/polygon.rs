@@ -1,8 +1,10 @@
 //! Simple polygons: area, orientation, point location, distance to the boundary, containment.
 //!
 //! Corners are in metres; a polygon is closed from its last corner to its first. Unless a function says otherwise the order of
-//! the corners does not matter. All sizes here are small (rooms have tens of corners), so plain loops serve.
+//! the corners does not matter. These are plain loops over all
+//! corners; [`super::Boundary`] answers the same for rooms of thousands.
 
+use super::grid::{Grid, bounds_of};
 use crate::geometry::{Vector2, cross};
 
 /// Edges of a polygon as pairs of corners; edge k runs from corner k to corner k + 1.
@@ -107,19 +109,29 @@ pub fn contains_segment(polygon: &[Vector2<f64>], a: Vector2<f64>, b: Vector2<f6
     ends && cuts.windows(2).all(|w| contains_within(polygon, a + along * (0.5 * (w[0] + w[1])), tolerance_m))
 }
 
+/// From this many edges on, those near an edge are looked up, and not all are compared with it.
+const MANY: usize = 64;
+
 /// The first pair of edges (k, l) that cross or touch although they are not neighbours, or that fold back onto each other;
 /// `None` for a simple polygon.
 #[must_use]
 pub fn self_intersection(polygon: &[Vector2<f64>]) -> Option<(usize, usize)> {
     let n = polygon.len();
     let corner = |k: usize| polygon[k % n];
+    // Edges that meet have boxes that meet.
+    let boxes = || edges(polygon).map(|(a, b)| bounds_of(&[a, b], 0.0)).collect::<Vec<_>>();
+    let grid = (n > MANY).then(|| Grid::new(&boxes()));
     for k in 0..n {
         // Neighbours share a corner by right; they must not share more.
         let (back, ahead) = (corner(k) - corner(k + 1), corner(k + 2) - corner(k + 1));
         if cross(back, ahead) == 0.0 && back.dot(&ahead) > 0.0 {
             return Some((k, (k + 1) % n));
         }
-        for l in k + 2..n {
+        let others = match &grid {
+            Some(grid) => grid.near(bounds_of(&[corner(k), corner(k + 1)], 0.0)),
+            None => (k + 2..n).collect(),
+        };
+        for l in others.into_iter().filter(|l| *l >= k + 2) {
             let neighbours = k == 0 && l == n - 1;
             if !neighbours && segments_meet(corner(k), corner(k + 1), corner(l), corner(l + 1)) {
                 return Some((k, l));

@@ -44,9 +44,10 @@ pub struct TextureSpec {
     /// Base colour: red, green, blue, 0 to 255. Of an image it is what shows through where the image is transparent.
     #[serde(default = "TextureSpec::default_colour")]
     pub colour: [u8; 3],
-    /// Width of surface that the pattern covers before it repeats, m. A pattern is as high as wide, an image as its sides ask.
-    #[serde(default = "TextureSpec::default_period")]
-    pub period_m: f64,
+    /// Width of surface after which it repeats, m. A pattern is as high as wide, an image as its sides ask. By default an image is
+    /// 4 m wide, a pattern on a floor or ceiling repeats after 4 m, and one on a wall or body not at all.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub period_m: Option<f64>,
     /// Strength of the pattern, 0 (plain) to 1; by default 0.6 of a pattern, 1 of an image.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub contrast: Option<f64>,
@@ -59,13 +60,10 @@ impl TextureSpec {
     /// A texture of the given family and colour with default period and contrast.
     #[must_use]
     pub fn new(family: TextureFamily, colour: [u8; 3]) -> Self {
-        Self { family: Some(family), image: None, colour, period_m: Self::default_period(), contrast: None, seed: None }
+        Self { family: Some(family), image: None, colour, period_m: None, contrast: None, seed: None }
     }
     fn default_colour() -> [u8; 3] {
         [170, 165, 155]
-    }
-    fn default_period() -> f64 {
-        4.0
     }
 }
 
@@ -87,15 +85,23 @@ pub struct Texture {
     pub colour: [u8; 3],
     /// Width and height of surface after which the pattern repeats, m.
     pub period_m: [f64; 2],
+    /// Whether the period was chosen for the surface, so that the pattern does not repeat along it.
+    pub fitted: bool,
     /// Strength of the pattern, 0 to 1.
     pub contrast: f64,
     /// Seed of the pattern.
     pub seed: u64,
 }
 
+/// Period of textures that are given none, m, unless it is fitted to a longer surface.
+const USUAL_PERIOD_M: f64 = 4.0;
+
 impl Texture {
-    /// The checked form of `spec`, whose image is among `pictures`; `seed` is taken where it has none of its own.
-    pub(super) fn new(spec: &TextureSpec, seed: u64, pictures: &Pictures) -> Self {
+    /// The checked form of `spec`, whose image is among `pictures`; `seed` is taken where it has none of its own. Along `length_m` of
+    /// its surface a pattern without a given period does not repeat.
+    ///
+    /// A longer period is a larger piece of the same pattern: details keep their size.
+    pub(super) fn new(spec: &TextureSpec, length_m: f64, seed: u64, pictures: &Pictures) -> Self {
         let (pattern, high) = match &spec.image {
             Some(path) => {
                 let picture = pictures.get(path);
@@ -105,12 +111,31 @@ impl Texture {
             None => (Pattern::Family(spec.family.unwrap_or(TextureFamily::Plain)), 1.0),
         };
         let usual = if spec.image.is_some() { 1.0 } else { 0.6 };
+        let fitted = spec.period_m.is_none() && varies_along(&pattern) && spec.image.is_none() && length_m > USUAL_PERIOD_M;
+        let period_m = spec.period_m.unwrap_or(if fitted { length_m } else { USUAL_PERIOD_M });
         Self {
             pattern,
             colour: spec.colour,
-            period_m: [spec.period_m, high * spec.period_m],
+            period_m: [period_m, high * period_m],
+            fitted,
             contrast: spec.contrast.unwrap_or(usual),
             seed: spec.seed.unwrap_or(seed),
         }
     }
+}
+
+impl Texture {
+    /// In how many places of a surface of this length it looks the same.
+    pub(super) fn repeats(&self, length_m: f64) -> usize {
+        if varies_along(&self.pattern) && self.contrast > 0.0 {
+            libm::ceil(length_m / self.period_m[0] - 1e-3).max(1.0) as usize
+        } else {
+            1
+        }
+    }
+}
+
+/// Whether something can be told apart along a surface with this pattern.
+fn varies_along(pattern: &Pattern) -> bool {
+    !matches!(pattern, Pattern::Family(TextureFamily::Plain | TextureFamily::Bands))
 }

@@ -66,6 +66,10 @@ const FINEST_M: f64 = 0.001;
 /// large.
 pub(super) fn fineness<'a>(textures: impl Iterator<Item = &'a Texture>) -> Vec<u32> {
     let wanted = |texture: &Texture| {
+        if texture.fitted {
+            // No power of two: many walls are a little longer than one.
+            return (0..FINEST).find(|&f| f64::from(size(f)) * COARSEST_M >= texture.period_m[0]).unwrap_or(FINEST);
+        }
         let period_m = texture.period_m[0].max(texture.period_m[1]);
         let reach = |texel_m: f64, most: u32| (0..most).find(|&n| f64::from(1 << n) * texel_m >= period_m).unwrap_or(most);
         let log2_size = match &texture.pattern {
@@ -145,7 +149,14 @@ mod tests {
     use super::*;
 
     fn texture(family: TextureFamily, period_m: f64) -> Texture {
-        Texture { pattern: Pattern::Family(family), colour: [150, 120, 90], period_m: [period_m; 2], contrast: 0.6, seed: 7 }
+        Texture {
+            pattern: Pattern::Family(family),
+            colour: [150, 120, 90],
+            period_m: [period_m; 2],
+            fitted: false,
+            contrast: 0.6,
+            seed: 7,
+        }
     }
 
     fn baked(surface: &Surface<'_>, fineness: u32) -> (Baked, Vec<u32>) {

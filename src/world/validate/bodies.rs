@@ -3,7 +3,8 @@
 use super::room::{polygon_inside, texture};
 use super::{Faults, GREATEST_M, TOLERANCE_M};
 use crate::geometry::Vector2;
-use crate::world::convex::{Convex, gap_to_walls_m};
+use crate::world::convex::Convex;
+use crate::world::grid::Grid;
 use crate::world::polygon::{anticlockwise, contains, contains_within, edges};
 use crate::world::spec::{BodySpec, ShapeSpec};
 use crate::world::{Body, Footprint, MotionSpec, Piece, World, WorldSpec};
@@ -109,7 +110,7 @@ pub(super) fn check_places(world: &World, places: &[String], faults: &mut Faults
     let shapes: Vec<Convex> = world.bodies.iter().map(|b| Convex::of_body(b, &b.pose)).collect();
     let mut inside = vec![true; shapes.len()];
     for (k, shape) in shapes.iter().enumerate() {
-        let gap_m = gap_to_walls_m(&world.outline, shape);
+        let gap_m = gap_to_walls_m(world, shape);
         inside[k] = gap_m >= -TOLERANCE_M;
         if !inside[k] {
             let how = if gap_m.is_finite() { format!("{:.3} m deep in a wall", -gap_m) } else { "outside the room".to_owned() };
@@ -118,8 +119,9 @@ pub(super) fn check_places(world: &World, places: &[String], faults: &mut Faults
             faults.add(format!("{}.position_m", places[k]), format!("[{}, {}], {how}", position.x, position.y), allowed);
         }
     }
+    let grid = Grid::new(&shapes.iter().map(|shape| shape.bounds(0.0)).collect::<Vec<_>>());
     for k in 0..shapes.len() {
-        for l in 0..k {
+        for l in grid.near(shapes[k].bounds(0.0)).into_iter().take_while(|l| *l < k) {
             let depth_m = -shapes[k].gap_m(&shapes[l]);
             if depth_m > TOLERANCE_M && at_same_height(&world.bodies[k], &world.bodies[l]) {
                 let position = world.bodies[k].pose.position();
@@ -129,27 +131,40 @@ pub(super) fn check_places(world: &World, places: &[String], faults: &mut Faults
             }
         }
     }
-    let pieces: Vec<_> = world.partitions.iter().flat_map(|p| p.pieces.iter().map(move |piece| (p, piece))).collect();
-    let pieces: Vec<_> =
-        pieces.iter().map(|(p, piece)| (*p, *piece, Convex::polygon(&p.footprint(piece.along_m), 0.0))).collect();
     for (k, body) in world.bodies.iter().enumerate() {
-        let meets = |piece: &Piece| body.bottom_m + TOLERANCE_M < piece.top_m && piece.bottom_m + TOLERANCE_M < body.top_m;
-        for (partition, _, piece) in pieces.iter().filter(|(_, piece, _)| meets(piece)) {
-            let depth_m = -shapes[k].gap_m(piece);
-            if depth_m > TOLERANCE_M {
-                let position = body.pose.position();
-                let found = format!("[{}, {}], {depth_m:.3} m deep in \"{}\"", position.x, position.y, partition.name);
-                let allowed = "a body outside all walls; it may touch them";
-                faults.add(format!("{}.position_m", places[k]), found, allowed);
-                break;
-            }
-        }
+        check_partitions(world, body, &shapes[k], &places[k], faults);
     }
     for (k, body) in world.bodies.iter().enumerate() {
         if inside[k] {
             check_motion(world, body, &places[k], faults);
         }
     }
+}
+
+/// Asks that a body is in no wall inside the room.
+fn check_partitions(world: &World, body: &Body, shape: &Convex, place: &str, faults: &mut Faults) {
+    let (low, high) = shape.bounds(0.0);
+    let meets = |piece: &&Piece| body.bottom_m + TOLERANCE_M < piece.top_m && piece.bottom_m + TOLERANCE_M < body.top_m;
+    for wall in world.partitions_near(low, high).into_iter().map(|k| &world.partitions[k]) {
+        let depth_of = |piece: &Piece| -shape.gap_m(&Convex::polygon(&wall.footprint(piece.along_m), 0.0));
+        let depth_m = wall.pieces.iter().filter(meets).map(depth_of).fold(0.0, f64::max);
+        if depth_m > TOLERANCE_M {
+            let position = body.pose.position();
+            let found = format!("[{}, {}], {depth_m:.3} m deep in \"{}\"", position.x, position.y, wall.name);
+            return faults.add(format!("{place}.position_m"), found, "a body outside all walls; it may touch them");
+        }
+    }
+}
+
+/// Gap between a shape and the nearest wall of the room, m, as [`crate::world::convex::gap_to_walls_m`] tells it where it is not positive; some
+/// positive number elsewhere.
+fn gap_to_walls_m(world: &World, shape: &Convex) -> f64 {
+    if !world.boundary().contains(shape.middle()) {
+        return f64::NEG_INFINITY;
+    }
+    let (low, high) = shape.bounds(0.0);
+    let walls = world.boundary().walls_near(low, high).into_iter().map(|k| world.wall(k));
+    walls.map(|(a, b)| shape.gap_m(&Convex::corridor(a, b, 0.0))).fold(f64::MAX, f64::min)
 }
 
 fn at_same_height(a: &Body, b: &Body) -> bool {
@@ -165,10 +180,11 @@ fn check_motion(world: &World, body: &Body, place: &str, faults: &mut Faults) {
     let standing: Vec<_> = world.bodies.iter().filter(|b| b.stands() && at_same_height(b, body)).collect();
     let in_the_way = |a, b| {
         let swept = Convex::corridor(a, b, reach_m);
-        if gap_to_walls_m(&world.outline, &swept) < -TOLERANCE_M {
+        if gap_to_walls_m(world, &swept) < -TOLERANCE_M {
             return Some("a wall".to_owned());
         }
-        let partition = world.partitions.iter().find(|p| {
+        let (low, high) = swept.bounds(0.0);
+        let partition = world.partitions_near(low, high).into_iter().map(|k| &world.partitions[k]).find(|p| {
             let mut stretches = p.stretches(body.bottom_m, body.top_m).into_iter();
             stretches.any(|s| swept.gap_m(&Convex::polygon(&p.footprint(s), 0.0)) < -TOLERANCE_M)
         });

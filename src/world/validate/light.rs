@@ -2,7 +2,6 @@
 
 use super::room::texture;
 use super::{Faults, LEAST_SIZE_M, TOLERANCE_M};
-use crate::world::polygon::contains;
 use crate::world::{World, WorldSpec};
 
 /// Most windows: each is part of every picture's light.
@@ -46,7 +45,7 @@ pub(super) fn check_places(world: &World, faults: &mut Faults) {
         let [x, y, z] = lamp.position_m;
         let place = format!("light.lamps[{k}].position_m");
         if !faults.touch(&place) && !faults.touch("room.height_m") {
-            let inside = contains(&world.outline, [x, y].into()) && z > 0.0 && z <= world.spec.room.height_m;
+            let inside = world.boundary().contains([x, y].into()) && z > 0.0 && z <= world.spec.room.height_m;
             let allowed = format!("a point in the room, between the floor and its ceiling at {} m", world.spec.room.height_m);
             faults.unless(inside, place, format!("{:?}", lamp.position_m), allowed);
         }

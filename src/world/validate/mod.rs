@@ -61,6 +61,7 @@ pub(super) fn check(spec: &WorldSpec, known: &[Fault]) -> Vec<Fault> {
     let sound: Vec<usize> = (0..spec.walls.len()).filter(|&k| walls::is_sound(k, &faults)).collect();
     let mut number = 0..;
     world.partitions.retain(|_| number.next().is_some_and(|k| sound.binary_search(&k).is_ok()));
+    world.index();
 
     room::check_places(&world, &mut faults);
     walls::check_places(&world, &sound, &mut faults);

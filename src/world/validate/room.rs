@@ -2,7 +2,7 @@
 
 use super::{Faults, GREATEST_M, TOLERANCE_M};
 use crate::geometry::Vector2;
-use crate::world::polygon::{contains_segment, edges};
+use crate::world::polygon::edges;
 use crate::world::spec::TextureSpec;
 use crate::world::{World, WorldSpec};
 
@@ -39,7 +39,9 @@ pub(super) fn texture(place: &str, texture: &TextureSpec, faults: &mut Faults) {
         (Some(_), Some(_)) => faults.add(format!("{place}.image"), "an image beside a family", "one of them"),
         _ => {}
     }
-    faults.between(format!("{place}.period_m"), texture.period_m, 0.01, GREATEST_M);
+    if let Some(period_m) = texture.period_m {
+        faults.between(format!("{place}.period_m"), period_m, 0.01, GREATEST_M);
+    }
     if let Some(contrast) = texture.contrast {
         faults.between(format!("{place}.contrast"), contrast, 0.0, 1.0);
     }
@@ -56,7 +58,7 @@ pub(super) fn check_places(world: &World, faults: &mut Faults) {
 
 /// Asks that a polygon lies in the room.
 pub(super) fn polygon_inside(world: &World, polygon: &[Vector2<f64>], place: &str, faults: &mut Faults) {
-    let outside = edges(polygon).find(|&(a, b)| !contains_segment(&world.outline, a, b, TOLERANCE_M));
+    let outside = edges(polygon).find(|&(a, b)| !world.boundary().contains_segment(a, b, TOLERANCE_M));
     if let Some((a, b)) = outside {
         let found = format!("an edge from [{}, {}] to [{}, {}] that leaves the room", a.x, a.y, b.x, b.y);
         faults.add(place, found, "a polygon inside the room");

@@ -2,7 +2,6 @@
 
 use super::room::texture;
 use super::{Faults, LEAST_SIZE_M, TOLERANCE_M};
-use crate::world::polygon::contains_segment;
 use crate::world::spec::{OpeningKind, OpeningSpec, WallSpec};
 use crate::world::{World, WorldSpec};
 
@@ -107,7 +106,7 @@ fn check_overlap(place: &str, openings: &[OpeningSpec], faults: &mut Faults) {
 pub(super) fn check_places(world: &World, numbers: &[usize], faults: &mut Faults) {
     for (partition, k) in world.partitions.iter().zip(numbers) {
         let [a, b] = [partition.from, partition.from + partition.along * partition.length_m];
-        if !contains_segment(&world.outline, a, b, TOLERANCE_M) {
+        if !world.boundary().contains_segment(a, b, TOLERANCE_M) {
             let found = format!("a wall from [{}, {}] to [{}, {}] that leaves the room", a.x, a.y, b.x, b.y);
             faults.add(format!("walls[{k}].to_m"), found, "a wall inside the room; its ends may lie on the room's walls");
         }
