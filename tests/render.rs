@@ -9,6 +9,7 @@ use wayhome::geometry::{Pose, Twist, Vector2, direction};
 use wayhome::panorama::{INSTANCE_CEILING, INSTANCE_FLOOR, Panorama, Projection, ProjectionKind};
 use wayhome::random::Seed;
 use wayhome::render::{Camera, CpuRenderer, Renderer, SHADER, Scene, View};
+use wayhome::verify::render::building;
 use wayhome::world::spec::LightSpec;
 use wayhome::world::{Body, Footprint, LightPreset, OpticsSpec, Window, World, WorldSpec};
 
@@ -136,7 +137,7 @@ fn every_pixel_sees_what_parrys_rays_meet() {
     let built_in = World::builtin_names().into_iter().map(|name| World::open(name).unwrap());
     let mut stream = Seed(4).stream("poses");
     let (mut pixels, mut at_outlines) = (0, 0);
-    for world in built_in.chain([world(HALL), world(STACK), world(include_str!("support/flat.toml"))]) {
+    for world in built_in.chain([world(HALL), world(STACK), world(include_str!("support/flat.toml")), building(7).unwrap()]) {
         // What can move has moved.
         let moved = |b: &Body| {
             if b.motion.is_some() { Pose::new(b.pose.x + 0.1, b.pose.y - 0.2, b.pose.heading + 0.7) } else { b.pose }

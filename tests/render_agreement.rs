@@ -1,4 +1,4 @@
-//! The GPU renderer against its CPU twin: all built-in worlds and four more, under all lights and through all cameras but for
+//! The GPU renderer against its CPU twin: all built-in worlds and five more, under all lights and through all cameras but for
 //! their noise, from random poses.
 //!
 //! Where there is no adapter this says loudly that it did not run, and fails if `WAYHOME_REQUIRE_GPU` is 1. A comparison that
@@ -15,6 +15,7 @@ use wayhome::geometry::{Pose, Twist, Vector2};
 use wayhome::panorama::{Panorama, Projection, ProjectionKind};
 use wayhome::random::{Seed, Stream};
 use wayhome::render::{Camera, CpuRenderer, GpuRenderer, Renderer, Scene, View};
+use wayhome::verify::render::building;
 use wayhome::world::{CameraPreset, LightPreset, OpticsSpec, World};
 
 /// Most pixels whose instance or range may differ, as a share: outlines, where the last bit decides.
@@ -200,7 +201,7 @@ fn gpu_and_cpu_agree() {
     let (mut bytes, mut unequal) = (0, 0);
     let builtin = World::builtin_names().into_iter().map(|name| World::open(name).unwrap());
     let flat = text(include_str!("support/flat.toml"));
-    for world in builtin.chain([text(CELLAR), text(&forest()), text(&queue()), flat]) {
+    for world in builtin.chain([text(CELLAR), text(&forest()), text(&queue()), flat, building(7).unwrap()]) {
         let name = world.spec.name.clone();
         let scene = Scene::new(&world).unwrap();
         for k in 0..LightPreset::ALL.len() * CameraPreset::ALL.len() {

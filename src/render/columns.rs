@@ -125,7 +125,7 @@ fn hit_polygon(frame: &Frame, body: &Body, direction: [f32; 2]) -> Option<Hit> {
 
 /// Angle of (x, y) in (-pi, pi], to 1e-5 rad: by a polynomial, so that CPU and GPU compute the same.
 #[inline(always)]
-fn angle(y: f32, x: f32) -> f32 {
+pub(super) fn angle(y: f32, x: f32) -> f32 {
     let (ax, ay) = (x.abs(), y.abs());
     let ratio = ax.min(ay) / ax.max(ay).max(1.0e-30);
     let s = ratio * ratio;

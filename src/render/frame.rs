@@ -7,6 +7,7 @@ use bytemuck::{Pod, Zeroable};
 
 use super::inner::{Block, Face, look};
 use super::scene::Prism;
+use super::visible::Sight;
 use super::{Scene, View};
 use crate::error::{Error, Result};
 use crate::geometry::{Pose, Vector2, cross, sin_cos};
@@ -148,6 +149,8 @@ pub(super) struct Frame {
     /// For each surface of this view, [`look`]: floor, ceiling, walls and bodies in the order of `edges` and `bodies`; and what fills
     /// up to a multiple of four.
     pub looks: Vec<u32>,
+    /// What is seen of a large room.
+    sight: Sight,
     /// Lamps, then pieces of windows.
     pub lamps: Vec<Lamp>,
     /// How many are lamps.
@@ -171,6 +174,7 @@ impl Frame {
             edges: Vec::new(),
             bodies: Vec::new(),
             looks: Vec::new(),
+            sight: Sight::default(),
             lamps: Vec::new(),
             lamp_count: 0,
             circle: Vec::new(),
@@ -189,27 +193,29 @@ impl Frame {
         self.fill_directions(&projection, view.robot.heading);
         self.fill_rows(&projection, scene);
         self.edges.clear();
-        push_edges(&mut self.edges, scene.outline.iter().map(|&p| p - camera), -1.0);
         self.looks.clear();
-        let first_body = 2 + self.edges.len();
-        self.looks.extend((0..first_body).map(own_look));
-        for face in &scene.inner.faces {
-            self.edges.push(edge_of(face, camera));
-            self.looks.push(face.look);
-        }
+        self.looks.extend([0, 1].map(own_look));
+        self.push_walls(scene, camera);
         let wall_count = self.edges.len() as u32;
         self.bodies.clear();
-        for (prism, pose) in scene.bodies.iter().zip(view.bodies) {
-            self.push_body(prism, scene.factors.lamps, pose, camera);
+        let first_body = 2 + scene.outline.len();
+        for (k, (prism, pose)) in scene.bodies.iter().zip(view.bodies).enumerate() {
+            if scene.index.is_none() || self.sight.sees_disc(pose.position(), prism.footprint.bounding_radius()) {
+                self.push_body(prism, scene.factors.lamps, pose, camera);
+                self.looks.push(own_look(first_body + k));
+                if self.bodies.last().is_some_and(|body| self.holds_camera(body, scene)) {
+                    return Err(inside(&prism.name, scene, camera));
+                }
+            }
         }
-        self.refuse_inside(scene, camera)?;
-        for pane in &scene.windows {
+        if let Some(name) = inner_wall_at(scene, camera) {
+            return Err(inside(name, scene, camera));
+        }
+        for (k, pane) in scene.windows.iter().enumerate() {
             self.push_body(pane, scene.factors.windows, &Pose::IDENTITY, camera);
+            self.looks.push(own_look(first_body + scene.bodies.len() + k));
         }
-        self.looks.extend((first_body..first_body + self.bodies.len()).map(own_look));
-        for block in &scene.inner.blocks {
-            self.push_block(block, camera);
-        }
+        self.push_blocks(scene, camera);
         self.looks.resize(self.looks.len().next_multiple_of(4), 0);
         self.fill_lamps(scene, camera);
         let texels = |bytes: usize| bytes.div_ceil(16) as u32;
@@ -274,30 +280,50 @@ impl Frame {
         }
     }
 
-    /// Refuses a camera inside the solid of a body or of a wall inside the room.
-    fn refuse_inside(&self, scene: &Scene, camera: Vector2<f64>) -> Result<()> {
-        let height = scene.camera_height_m as f32;
-        let holds = |body: &Body| {
-            let [x, y] = body.centre;
-            let edges = &self.edges[body.first_edge as usize..][..body.edge_count as usize];
-            let within = if body.radius > 0.0 {
-                x * x + y * y < body.radius * body.radius
-            } else {
-                edges.iter().all(|e| e.distance > 0.0)
-            };
-            within && body.bottom < height && height < body.top
+    /// Appends the walls: those of the room, and the faces inside it that are as high.
+    fn push_walls(&mut self, scene: &Scene, camera: Vector2<f64>) {
+        let walls = scene.outline.len();
+        let Some(index) = &scene.index else {
+            push_edges(&mut self.edges, scene.outline.iter().map(|&p| p - camera), -1.0);
+            self.looks.extend((2..2 + walls).map(own_look));
+            self.edges.extend(scene.inner.faces.iter().map(|face| edge_of(face, camera)));
+            self.looks.extend(scene.inner.faces.iter().map(|face| face.look));
+            return;
         };
-        let within_wall = |(_, corners, [bottom_m, top_m]): &&(String, [Vector2<f64>; 4], [f64; 2])| {
-            let inside = (0..4).all(|k| cross(corners[(k + 1) % 4] - corners[k], camera - corners[k]) > 0.0);
-            inside && *bottom_m < scene.camera_height_m && scene.camera_height_m < *top_m
+        let corner = |k: usize| scene.outline[k % walls] - camera;
+        let edge_at = |number: u32| match (number as usize).checked_sub(walls) {
+            None => edge(corner(number as usize), corner(number as usize + 1), -1.0).0,
+            Some(face) => edge_of(&scene.inner.faces[face], camera),
         };
-        let body = self.bodies.iter().position(holds).map(|k| &scene.bodies[k].name);
-        match body.or_else(|| scene.inner.solids.iter().find(within_wall).map(|(name, ..)| name)) {
-            None => Ok(()),
-            Some(name) => {
-                Err(Error::CameraInside { body: name.clone(), x_m: camera.x, y_m: camera.y, z_m: scene.camera_height_m })
-            }
+        let shade_m = if scene.light.corner_shade > 0.0 { scene.light.corner_reach_m } else { 0.0 };
+        self.sight.find(index, camera, &self.directions, edge_at, shade_m);
+        for &number in &self.sight.faces {
+            self.edges.push(edge_at(number));
+            let face = (number as usize).checked_sub(walls);
+            self.looks.push(face.map_or_else(|| own_look(2 + number as usize), |face| scene.inner.faces[face].look));
         }
+    }
+
+    /// Appends the pieces of inner walls that are lower than the room or hang.
+    fn push_blocks(&mut self, scene: &Scene, camera: Vector2<f64>) {
+        let blocks = &scene.inner.blocks;
+        if scene.index.is_none() {
+            blocks.iter().for_each(|block| self.push_block(block, camera));
+            return;
+        }
+        for k in 0..self.sight.blocks.len() {
+            self.push_block(&blocks[self.sight.blocks[k] as usize], camera);
+        }
+    }
+
+    /// Whether the camera is inside the solid of a body.
+    fn holds_camera(&self, body: &Body, scene: &Scene) -> bool {
+        let height = scene.camera_height_m as f32;
+        let [x, y] = body.centre;
+        let edges = &self.edges[body.first_edge as usize..][..body.edge_count as usize];
+        let within =
+            if body.radius > 0.0 { x * x + y * y < body.radius * body.radius } else { edges.iter().all(|e| e.distance > 0.0) };
+        within && body.bottom < height && height < body.top
     }
 
     fn fill_directions(&mut self, projection: &Projection, heading: f64) {
@@ -388,6 +414,26 @@ impl Frame {
     pub fn instance(&self, surface: u32) -> u16 {
         self.looks.get(surface as usize).map_or(0, |look| (look >> 16) as u16)
     }
+}
+
+/// Name of the inner wall that the camera is inside of.
+fn inner_wall_at(scene: &Scene, camera: Vector2<f64>) -> Option<&str> {
+    let solids = &scene.inner.solids;
+    let holds = |k: &usize| {
+        let (_, corners, [bottom_m, top_m]) = &solids[*k];
+        let inside = (0..4).all(|k| cross(corners[(k + 1) % 4] - corners[k], camera - corners[k]) > 0.0);
+        inside && *bottom_m < scene.camera_height_m && scene.camera_height_m < *top_m
+    };
+    let found = match &scene.index {
+        Some(index) => index.solids_at(camera).into_iter().map(|k| k as usize).filter(holds).min(),
+        None => (0..solids.len()).find(holds),
+    };
+    found.map(|k| solids[k].0.as_str())
+}
+
+/// The error of a camera that is inside something.
+fn inside(name: &str, scene: &Scene, camera: Vector2<f64>) -> Error {
+    Error::CameraInside { body: name.to_owned(), x_m: camera.x, y_m: camera.y, z_m: scene.camera_height_m }
 }
 
 /// The look of a surface that is numbered as its material and its instance are.

@@ -4,7 +4,8 @@
 //! a Rust file of the same name and structure. They agree to within rounding, which `tests/render_agreement.rs` measures.
 //!
 //! The way of a picture: [`Scene::new`] packs a world once and bakes its textures (`scene`, `texture`). For each [`View`] the
-//! geometry is moved to the camera and tables of directions and rows are filled (`frame`). Each column then finds the walls
+//! geometry is moved to the camera and tables of directions and rows are filled (`frame`), with what is seen of a large building
+//! (`visible`). Each column then finds the walls
 //! and bodies in its upright plane (`columns`), its rows pick what they see of them, and each face gets its texture (`sample`)
 //! and light (`shade`). What a real [`Camera`] makes of it comes last (`camera`).
 //!
@@ -38,6 +39,7 @@ mod spans;
 mod stream;
 mod texels;
 mod texture;
+mod visible;
 
 use crate::error::{Error, Result};
 use crate::geometry::Pose;

@@ -1,5 +1,6 @@
 //! A world packed for rendering: the same for both renderers, and the same for every view.
 
+use std::collections::HashMap;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -9,6 +10,7 @@ use rayon::prelude::*;
 use super::huge_pages;
 use super::inner::InnerWalls;
 use super::texture::{self, Surface};
+use super::visible::Index;
 use crate::error::Result;
 use crate::geometry::Vector2;
 use crate::panorama::INSTANCE_FIRST_WALL;
@@ -123,7 +125,9 @@ pub struct Scene {
     /// Panes of windows, around the room's origin.
     pub(super) windows: Vec<Prism>,
     /// What walls inside the room consist of.
-    pub(super) inner: InnerWalls,
+    pub(super) inner: Arc<InnerWalls>,
+    /// Walls by place, where there are many.
+    pub(super) index: Option<Arc<Index>>,
     pub(super) room_height_m: f64,
     pub(super) camera_height_m: f64,
     /// Position of the camera on the robot, m.
@@ -184,6 +188,10 @@ impl Scene {
             top_m: w.top_m,
             glow: std::f64::consts::PI * w.brightness,
         };
+        let inner = InnerWalls::new(world, materials.len() - 2 * world.partitions.len());
+        let walls = (0..world.outline.len()).map(|k| world.wall(k).into()).chain(inner.faces.iter().map(|f| [f.a, f.b]));
+        let blocks = inner.blocks.iter().map(|block| block.sides.map(|side| side.a));
+        let index = Index::new(walls, blocks, inner.solids.iter().map(|(_, corners, _)| corners)).map(Arc::new);
         let [forward, left] = world.spec.camera.offset_m;
         let light = &world.spec.light;
         let scene = Self {
@@ -191,7 +199,8 @@ impl Scene {
             outline: world.outline.clone(),
             bodies: world.bodies.iter().map(body).collect(),
             windows: world.windows.iter().map(window).collect(),
-            inner: InnerWalls::new(world, materials.len() - 2 * world.partitions.len()),
+            index,
+            inner: Arc::new(inner),
             room_height_m: world.spec.room.height_m,
             camera_height_m: world.spec.camera.height_m,
             camera_offset_m: Vector2::new(forward, left),
@@ -251,11 +260,15 @@ const PADDING: usize = 32;
 /// Bakes every texture once, also where several surfaces share it.
 fn pack(surfaces: &[Surface<'_>]) -> (Vec<Material>, Vec<u32>) {
     let mut distinct: Vec<Surface<'_>> = Vec::new();
+    let mut known: HashMap<_, Vec<usize>> = HashMap::new();
     let which: Vec<usize> = surfaces
         .iter()
         .map(|&s| {
-            distinct.iter().position(|&d| d == s).unwrap_or_else(|| {
+            // Few surfaces share colour, seed and period without being the same.
+            let alike = known.entry((s.texture.colour, s.texture.seed, s.texture.period_m.map(f64::to_bits))).or_default();
+            alike.iter().copied().find(|&k| distinct[k] == s).unwrap_or_else(|| {
                 distinct.push(s);
+                alike.push(distinct.len() - 1);
                 distinct.len() - 1
             })
         })

@@ -8,6 +8,8 @@
 //!   - `batch of 16, all threads`: pictures side by side.
 //!   - `gpu, alone` and `gpu, batch of 16`: the best adapter, upload and readback included; not there without an adapter.
 //! - `bodies`: what 10 to 1,000 of them cost.
+//! - `building`: a map of 5,100 inner walls with doors: how long it takes to load, to be packed without baking much, and a panorama in
+//!   it beside one in the hall of 40 walls, without discs; and to load an outline of 5,000 corners.
 //! - `scene`: packing the lab, which is mostly baking its textures.
 
 #![allow(clippy::unwrap_used, missing_docs)]
@@ -18,7 +20,7 @@ use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use wayhome::geometry::Pose;
 use wayhome::panorama::{Panorama, Projection};
 use wayhome::render::{CpuRenderer, GpuRenderer, InstructionSet, Renderer, Scene, View};
-use wayhome::verify::render::{BODIES, SIZES, hall};
+use wayhome::verify::render::{BODIES, SIZES, building, hall};
 use wayhome::world::World;
 
 /// Pictures of a batch.
@@ -54,6 +56,18 @@ impl Hall {
         };
         renderer.render_batch(&self.scene, &views, &mut look).unwrap();
     }
+}
+
+/// A round room with a wall of so many corners.
+fn cave(corners: u32) -> String {
+    let corner = |k: u32| {
+        let angle = std::f64::consts::TAU * f64::from(k) / f64::from(corners);
+        let radius = 40.0 + 0.02 * f64::from((7 * k) % 5) + 10.0 * (5.0 * angle).sin();
+        format!("[{:.4}, {:.4}]", radius * angle.cos(), radius * angle.sin())
+    };
+    let outline: Vec<String> = (0..corners).map(corner).collect();
+    let wall = "{ family = \"brick\", seed = 1 }";
+    format!("name = \"cave\"\nhome = {{ x_m = 0, y_m = 0 }}\n[room]\noutline_m = [{}]\nwalls = [{wall}]\n", outline.join(", "))
 }
 
 fn benches(c: &mut Criterion) {
@@ -99,6 +113,29 @@ fn benches(c: &mut Criterion) {
             pool.install(|| b.iter(|| hall.picture(&mut cpu, projection, &mut k, &mut out)));
         });
     }
+    group.finish();
+    let mut group = c.benchmark_group("building");
+    group.sample_size(20);
+    group.bench_function("load", |b| b.iter(|| building(51).unwrap()));
+    let world = building(51).unwrap();
+    group.bench_function("pack", |b| b.iter(|| Scene::new(&world).unwrap()));
+    let building = Hall { scene: Scene::new(&world).unwrap(), bodies: world.body_poses(), world };
+    let at = building.world.home;
+    let hall = Hall::new(0);
+    for (name, place, home) in [("5,100 walls", &building, at), ("40 walls", &hall, Pose::IDENTITY)] {
+        let projection = place.world.projection_of_size(1440, 180);
+        let mut cpu = CpuRenderer::new();
+        group.bench_function(format!("panorama, {name}"), |b| {
+            pool.install(|| {
+                b.iter(|| {
+                    k += 1;
+                    let robot = Pose::new(home.x + 0.1, home.y - 0.2, 0.01 * k as f64);
+                    cpu.render(&place.scene, &View { projection, robot, bodies: &place.bodies }, &mut out).unwrap();
+                });
+            });
+        });
+    }
+    group.bench_function("load an outline of 5,000 corners", |b| b.iter(|| World::from_toml(&cave(5000), "cave").unwrap()));
     group.finish();
     let lab = World::open("lab").unwrap();
     c.bench_function("scene", |b| b.iter(|| Scene::new(&lab).unwrap()));

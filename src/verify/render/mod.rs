@@ -63,6 +63,35 @@ pub fn hall(discs: usize) -> Result<World> {
     World::from_toml(&text, "hall")
 }
 
+/// A building of so many by so many rooms, 3 m wide, with a door or a window in each of the 2 n (n - 1) walls between them. The walls
+/// share one texture, so that packing the scene is not all baking.
+///
+/// # Errors
+/// None; the world is a valid one.
+pub fn building(rooms: u32) -> Result<World> {
+    const ROOM_M: f64 = 3.0;
+    let across = ROOM_M * f64::from(rooms);
+    let home = ROOM_M * (f64::from(rooms / 2) + 0.5);
+    let wall = "{ family = \"posters\", colour = [190, 180, 160], seed = 1, period_m = 4 }";
+    let mut text = format!(
+        "name = \"building\"\nhome = {{ x_m = {home}, y_m = {home} }}\ncamera = {{ height_m = 0.5 }}\n[room]\nheight_m = 2.5\n\
+         outline_m = [[0, 0], [{across}, 0], [{across}, {across}], [0, {across}]]\nwalls = [{wall}]\n"
+    );
+    for k in 0..rooms * (rooms - 1) {
+        let (along, line) = (ROOM_M * f64::from(k % rooms), ROOM_M * f64::from(k / rooms + 1));
+        let opening = |number: u32| {
+            let from_start_m = 0.6 + 0.15 * f64::from((7 * k + 3 * number) % 9);
+            let what = if number % 5 == 0 { "window" } else { "door" };
+            format!("{{ kind = \"{what}\", from_start_m = {from_start_m:.2}, width_m = 0.9 }}")
+        };
+        let ends = [[[along, line], [along + ROOM_M, line]], [[line, along], [line, along + ROOM_M]]];
+        for (number, [from, to]) in (2 * k..).zip(ends) {
+            let _ = writeln!(text, "[[walls]]\nfrom_m = {from:?}\nto_m = {to:?}\nopenings = [{}]", opening(number));
+        }
+    }
+    World::from_toml(&text, "building")
+}
+
 /// How fast something renders.
 #[derive(Debug, Clone, Serialize)]
 pub struct Throughput {

@@ -36,10 +36,16 @@ pub(super) fn check_values(spec: &WorldSpec, faults: &mut Faults) {
     let walls = spec.walls.iter().enumerate().filter(|(_, w)| !w.name.is_empty());
     let walls = walls.map(|(k, w)| (format!("walls[{k}]"), w.name.as_str()));
     faults.distinct(bodies().map(|(place, body)| (place, body.name.as_str())).chain(walls));
-    let walls = spec.room.outline_m.len() + spec.walls.len();
+    // Renderers have a material for each side of a wall.
+    let walls = spec.room.outline_m.len() + 2 * spec.walls.len();
     let instances = walls + spec.landmarks.len() + spec.obstacles.len() + spec.light.windows.len();
     let allowed = format!("at most {MOST_INSTANCES}");
-    faults.unless(instances <= MOST_INSTANCES, "obstacles", format!("{instances} walls, bodies and windows in all"), allowed);
+    faults.unless(
+        instances <= MOST_INSTANCES,
+        "obstacles",
+        format!("{instances} walls, bodies and windows in all, inner walls counted twice"),
+        allowed,
+    );
 }
 
 fn check_body(place: &str, body: &BodySpec, spec: &WorldSpec, faults: &mut Faults) {
