@@ -241,6 +241,32 @@ fn all_faults_come_at_once_with_line_and_owner() {
 }
 
 #[test]
+fn a_period_shorter_than_its_wall_is_warned_of() {
+    let warned = |sound: &str, spoilt: &str| {
+        let text = SOUND.replacen(sound, spoilt, 1);
+        let world = World::from_toml(&text, "sound.toml").expect("sound");
+        world.warnings.iter().map(|w| (w.place.clone(), w.line, w.message.clone())).collect::<Vec<_>>()
+    };
+    assert_eq!(warned("", ""), []);
+    let line = |text: &str| SOUND.lines().position(|l| l.contains(text)).map(|k| k + 1);
+    let [(place, at, message)] = &warned("contrast = 0.5", "contrast = 0.5, period_m = 1.5")[..] else {
+        panic!("one for all walls")
+    };
+    assert_eq!((place.as_str(), *at), ("room.walls[0].period_m", line("walls =")));
+    assert!(message.starts_with("wall 0, 4.00 m long, looks the same in 3 places"), "{message}");
+    let [(place, ..)] = &warned("period_m = 2.0", "period_m = 0.6")[..] else { panic!("the desk's front") };
+    assert_eq!(place, "landmarks[1].texture.period_m");
+    let texture = "to_m = [2.2, 3.0]\ntexture = { family = \"tiles\", period_m = 0.3 }";
+    let [(place, ..)] = &warned("to_m = [2.2, 3.0]", texture)[..] else { panic!("the stub") };
+    assert_eq!(place, "walls[0].texture.period_m");
+    assert_eq!(
+        warned("family = \"brick\", contrast = 0.5", "family = \"bands\", period_m = 1.0"),
+        [],
+        "the same everywhere anyway"
+    );
+}
+
+#[test]
 fn a_syntax_error_names_line_and_column() {
     let message = World::from_toml("name = \"a\"\n[room\n", "broken.toml").expect_err("broken").to_string();
     assert!(message.contains("broken.toml") && message.contains("line 2, column 6"), "{message}");

@@ -3,7 +3,7 @@
 use tiny_skia::{Color, FillRule, LineCap, LineJoin, Paint, Path, PathBuilder, Pixmap, Stroke, StrokeDash, Transform};
 
 use super::messages::rgb;
-use crate::draw::map::paint::{BodyPaint, HOME, INK, friction_colour};
+use crate::draw::map::paint::{BodyPaint, HOME, INK, SEEN_THROUGH, WALL, friction_colour};
 use crate::draw::map::{PathStyle, ellipse_axes};
 use crate::geometry::{Pose, Vector2, direction};
 use crate::world::polygon::bounds;
@@ -74,11 +74,15 @@ impl<'a> RoomRaster<'a> {
         let mut still = self.still.clone();
         still.fill(Color::WHITE);
         let room = self.polygon(&self.world.outline, &Pose::IDENTITY);
-        stroke(&mut still, room.as_ref(), "#4a4a4a", WALL_PX, &[]);
+        stroke(&mut still, room.as_ref(), WALL, WALL_PX, &[]);
         fill(&mut still, room.as_ref(), "#fbfaf7", 1.0);
         for zone in &self.world.zones {
             let area = self.polygon(&zone.polygon, &Pose::IDENTITY);
             fill(&mut still, area.as_ref(), &friction_colour(zone.friction), 1.0);
+        }
+        for stretch in self.world.plan_of_walls() {
+            let area = self.polygon(&stretch.corners, &Pose::IDENTITY);
+            fill(&mut still, area.as_ref(), if stretch.seen_through { SEEN_THROUGH } else { WALL }, 1.0);
         }
         let home = &self.world.home;
         let centre = self.at(home.position());

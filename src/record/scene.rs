@@ -46,6 +46,15 @@ pub(super) fn room(world: &World) -> SceneUpdate {
     for zone in &world.zones {
         floor.triangles.push(lid(&zone.polygon, &Pose::IDENTITY, 0.002, colour(&friction_colour(zone.friction), 1.0)));
     }
+    for (wall, piece) in world.partitions.iter().flat_map(|wall| wall.pieces.iter().map(move |piece| (wall, piece))) {
+        let corners = wall.footprint(piece.along_m);
+        for z in [piece.bottom_m, piece.top_m] {
+            let corners = corners.map(|p| point(p, z)).to_vec();
+            floor.lines.push(line(corners, line_primitive::Type::LineLoop, 0.02, colour(INK, 1.0)));
+        }
+        let posts = corners.iter().flat_map(|&p| [point(p, piece.bottom_m), point(p, piece.top_m)]).collect();
+        floor.lines.push(line(posts, line_primitive::Type::LineList, 0.02, colour(INK, 1.0)));
+    }
     let mut home = entity("home", "home", 0);
     let radius = world.spec.task.arrival_radius_m;
     home.lines.push(line(circle([radius, radius], 0.0), line_primitive::Type::LineLoop, 0.01, colour(HOME, 1.0)));

@@ -386,11 +386,13 @@ pub(super) const POINTS: usize = 4 * LANES;
 pub(super) struct PointRoom {
     /// Block by block the texels on either side of each point along u.
     pairs: [[[Pair; LANES]; 2]; POINTS / LANES],
+    /// Numbers of the walls that may darken them.
+    pub walls: Vec<u32>,
 }
 
 impl Default for PointRoom {
     fn default() -> Self {
-        Self { pairs: [[[[0; 2]; LANES]; 2]; POINTS / LANES] }
+        Self { pairs: [[[[0; 2]; LANES]; 2]; POINTS / LANES], walls: Vec::new() }
     }
 }
 

@@ -64,6 +64,40 @@ fn depth_at_wall(frame: &Frame, edge: &Edge, [x, y]: [f32; 2], normal: [f32; 2])
     if before > -BEHIND { depth } else { 0.0 }
 }
 
+/// From this many walls on, those near some points are sought first.
+const MANY_WALLS: u32 = 16;
+
+/// The walls that may darken points at horizontal distance `t` in some directions; in a room of few walls all of them.
+///
+/// The points lie in a disc around the middle one. A wall farther from that than its radius and the reach of corners together adds
+/// nothing to any of them.
+#[inline(always)]
+fn walls_near(frame: &Frame, x: &[f32; POINTS], y: &[f32; POINTS], t: f32, near: &mut Vec<u32>) {
+    near.clear();
+    if frame.params.corner_shade <= 0.0 {
+        return;
+    }
+    if frame.params.wall_count < MANY_WALLS {
+        near.extend(0..frame.params.wall_count);
+        return;
+    }
+    let middle = [t * x[POINTS / 2], t * y[POINTS / 2]];
+    let mut square = 0.0_f32;
+    for k in 0..POINTS {
+        let (dx, dy) = (t * x[k] - middle[0], t * y[k] - middle[1]);
+        square = square.max(dx * dx + dy * dy);
+    }
+    let most = (square.sqrt() + 1.0 / frame.params.inverse_reach) * 1.0001 + 1.0e-4;
+    for (edge, number) in frame.edges[..frame.params.wall_count as usize].iter().zip(0..) {
+        let before = edge.normal[0] * middle[0] + edge.normal[1] * middle[1] - edge.distance;
+        let along = edge.tangent[0] * middle[0] + edge.tangent[1] * middle[1] - edge.along;
+        let past = (-along).max(along - edge.length).max(0.0);
+        if before * before + past * past < most * most {
+            near.push(number);
+        }
+    }
+}
+
 /// Rows of a column that see the side of a wall or body; or nothing, [`Hit::NONE`], and then they are not shaded.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Run<'a> {
@@ -188,7 +222,11 @@ impl Run<'_> {
         let point = [at * direction[0], at * direction[1]];
         if frame.params.corner_shade > 0.0 {
             let walls = &frame.edges[..frame.params.wall_count as usize];
-            let nook = walls.iter().fold(0.0, |deepest: f32, e| deepest.max(depth_at_wall(frame, e, point, hit.normal)));
+            // The same as of all: what is farther away adds nothing.
+            let most = 1.001 / frame.params.inverse_reach;
+            let is_close = |e: &&Edge| (e.normal[0] * point[0] + e.normal[1] * point[1] - e.distance).abs() < most;
+            let depths = walls.iter().filter(is_close).map(|e| depth_at_wall(frame, e, point, hit.normal));
+            let nook = depths.fold(0.0, f32::max);
             let reaches = |depth: f32| 1.0 - frame.params.corner_shade * depth;
             for (light, row) in light.iter_mut().zip(rows) {
                 let z = eye + at * row.tan;
@@ -297,11 +335,11 @@ impl Plane {
 
     /// Light on it in some directions at horizontal distance `t`.
     #[inline(always)]
-    fn light(&self, frame: &Frame, x: &[f32; LANES], y: &[f32; LANES], t: f32) -> [f32; LANES] {
+    fn light(&self, frame: &Frame, x: &[f32; LANES], y: &[f32; LANES], t: f32, walls: &[u32]) -> [f32; LANES] {
         let mut light = [frame.params.ambient; LANES];
         if frame.params.corner_shade > 0.0 {
             let mut nook = [0.0_f32; LANES];
-            for edge in &frame.edges[..frame.params.wall_count as usize] {
+            for edge in walls.iter().map(|&wall| &frame.edges[wall as usize]) {
                 for k in 0..LANES {
                     nook[k] = nook[k].max(depth_at_wall(frame, edge, [t * x[k], t * y[k]], [0.0; 2]));
                 }
@@ -374,13 +412,15 @@ impl PlaneRow<'_> {
         }
         let points = Points { texels: self.texels, u: &u, v: &v };
         points.look_up(look_up, wanted, room);
+        walls_near(frame, x, y, self.t, &mut room.walls);
         let (x, y, out) = (x.as_chunks().0, y.as_chunks().0, out.as_chunks_mut::<LANES>().0);
         for (block, ((x, y), out)) in x.iter().zip(y).zip(out).enumerate() {
             if !is_wanted(wanted, block) {
                 continue;
             }
             let mut lit = [0; LANES];
-            points.shade(block, &self.plane.light(frame, x, y, self.t), room, &mut lit);
+            let light = self.plane.light(frame, x, y, self.t, &room.walls);
+            points.shade(block, &light, room, &mut lit);
             let wanted = (wanted >> (LANES * block)) as u16;
             if wanted == u16::MAX {
                 *out = lit;

@@ -1,7 +1,7 @@
 //! Lines of sight in the plane of the camera's height.
 
 use crate::geometry::{Pose, Vector2, cross};
-use crate::world::polygon::edges;
+use crate::world::polygon::{bounds, edges};
 use crate::world::{Footprint, Partition, World};
 
 /// Whether something stands between `camera` and the centre of body `target`, with the bodies at `bodies`.
@@ -25,7 +25,8 @@ fn by_a_partition(world: &World, camera: Vector2<f64>, goal: Vector2<f64>) -> bo
         let mut footprints = pieces.map(|piece| wall.footprint(piece.along_m));
         footprints.any(|corners| edges(&corners).any(|(p, q)| crossing(camera, goal, p, q).is_some()))
     };
-    world.partitions.iter().any(meets)
+    let (low, high) = bounds(&[camera, goal]);
+    world.partitions_near(low, high).into_iter().any(|k| meets(&world.partitions[k]))
 }
 
 /// Whether the segment from `a` to `b`, both in the footprint's own frame, meets the footprint.
@@ -43,7 +44,9 @@ fn behind_a_wall(world: &World, camera: Vector2<f64>, goal: Vector2<f64>, footpr
         Footprint::Polygon(corners) => corners.iter().map(|c| c.norm()).fold(0.0, f64::max),
     };
     let range_m = (goal - camera).norm();
-    edges(&world.outline).any(|(p, q)| crossing(camera, goal, p, q).is_some_and(|share| share * range_m < range_m - reach_m))
+    let (low, high) = bounds(&[camera, goal]);
+    let mut walls = world.boundary().walls_near(low, high).into_iter().map(|k| world.wall(k));
+    walls.any(|(p, q)| crossing(camera, goal, p, q).is_some_and(|share| share * range_m < range_m - reach_m))
 }
 
 /// Distance of the segment from `a` to `b` to the origin.

@@ -40,7 +40,7 @@ pub use robot::RobotSpec;
 pub use spec::{MotionSpec, TaskSpec, TextureFamily, TextureSpec, WorldSpec};
 pub use structure::{Field, fields};
 pub use texture::{Pattern, Texture};
-pub use wall::{Partition, Piece};
+pub use wall::{Partition, Piece, PlanStretch};
 
 /// A checked world.
 #[derive(Debug, Clone, PartialEq)]

@@ -8,6 +8,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::World;
 use super::texture::{Texture, TextureSpec};
 use crate::geometry::Vector2;
 
@@ -167,6 +168,32 @@ impl Partition {
             }
         }
         stretches
+    }
+}
+
+/// A stretch of a wall inside the room on a plan.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PlanStretch {
+    /// Corners, anti-clockwise, m.
+    pub corners: [Vector2<f64>; 4],
+    /// Whether the camera looks over it or through it; the robot does not pass it either way.
+    pub seen_through: bool,
+}
+
+impl World {
+    /// The walls inside the room as a plan shows them: what the robot does not pass, and over that what the camera does not see
+    /// through.
+    #[must_use]
+    pub fn plan_of_walls(&self) -> Vec<PlanStretch> {
+        let (robot_m, eye_m) = (self.spec.robot.height_m, self.spec.camera.height_m);
+        let stretches = |bottom_m, top_m, seen_through| {
+            let of_wall = move |wall: &Partition| -> Vec<_> {
+                let stretches = wall.stretches(bottom_m, top_m).into_iter();
+                stretches.map(|s| PlanStretch { corners: wall.footprint(s), seen_through }).collect()
+            };
+            self.partitions.iter().flat_map(of_wall)
+        };
+        stretches(0.0, robot_m, true).chain(stretches(eye_m, eye_m, false)).collect()
     }
 }
 

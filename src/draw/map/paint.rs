@@ -8,6 +8,10 @@ use crate::draw::shapes::px;
 use crate::draw::shapes::{self, blend, line, points};
 use crate::geometry::{Vector2, direction};
 
+/// Walls.
+pub(crate) const WALL: &str = "#4a4a4a";
+/// What the robot does not pass and the camera sees over or through.
+pub(crate) const SEEN_THROUGH: &str = "#d9d4c8";
 /// Home.
 pub(crate) const HOME: &str = "#c0143c";
 /// End of a run.

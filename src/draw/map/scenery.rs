@@ -6,7 +6,7 @@ use svg::node::element::{ClipPath, Definitions, Group};
 
 use super::MapDrawing;
 use super::legend::{Swatch, paint_body, way};
-use super::paint::{self, BodyPaint, INK, STARTS, circle, friction_colour, polygon};
+use super::paint::{self, BodyPaint, INK, SEEN_THROUGH, STARTS, WALL, circle, friction_colour, polygon};
 use crate::geometry::{Vector2, direction};
 use crate::world::polygon::{anticlockwise, bounds};
 use crate::world::{Body, Footprint, MotionSpec, World};
@@ -23,6 +23,7 @@ impl MapDrawing {
         self.draw_floor(world);
         self.floor = std::mem::take(&mut self.scenery);
         self.draw_start_region(world);
+        self.draw_inner_walls(world);
         // Ways first, so that bodies stand on them; what hangs last, because it is above.
         for body in &world.bodies {
             self.draw_way(body);
@@ -64,7 +65,7 @@ impl MapDrawing {
     fn draw_floor(&mut self, world: &World) {
         // The walls' outline first and the floor on top of it, so that walls lie outside the line that a robot can touch.
         let room = self.page(&world.outline);
-        let walls = polygon(&room).set("fill", "none").set("stroke", "#4a4a4a").set("stroke-width", 2.0 * WALL_PX);
+        let walls = polygon(&room).set("fill", "none").set("stroke", WALL).set("stroke-width", 2.0 * WALL_PX);
         self.add(walls.set("stroke-linejoin", "miter"));
         self.add(polygon(&room).set("fill", "#fbfaf7"));
         let clip = ClipPath::new().set("id", "room").add(polygon(&room));
@@ -79,6 +80,14 @@ impl MapDrawing {
             self.add(area.set("fill", friction_colour(zone.friction)).set("stroke", "#8fa3b5").set("stroke-width", 0.8));
             let name = if spec.name.is_empty() { "zone" } else { &spec.name };
             self.legend.add(Swatch::Zone(zone.friction), &format!("{name}, friction {}", zone.friction));
+        }
+    }
+
+    fn draw_inner_walls(&mut self, world: &World) {
+        for stretch in world.plan_of_walls() {
+            let area = polygon(&self.page(&stretch.corners));
+            let fill = if stretch.seen_through { SEEN_THROUGH } else { WALL };
+            self.add(area.set("fill", fill).set("stroke", WALL).set("stroke-width", 0.8));
         }
     }
 
