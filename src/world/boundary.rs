@@ -107,7 +107,7 @@ mod tests {
     /// A star of 400 corners, which its grid must not tell from what the plain loops say.
     #[test]
     fn a_boundary_of_many_corners_answers_as_plain_loops_do() {
-        let radius = |k: usize| if k % 2 == 0 { 3.0 } else { 4.0 + 0.01 * k as f64 };
+        let radius = |k: usize| if k.is_multiple_of(2) { 3.0 } else { 4.0 + 0.01 * k as f64 };
         let corners: Vec<_> = (0..400).map(|k| direction(0.005 * std::f64::consts::PI * k as f64) * radius(k)).collect();
         let boundary = Boundary::new(&corners);
         assert!(boundary.grid.is_some());

@@ -112,7 +112,9 @@ pub(super) fn bake(surface: &Surface<'_>, fineness: u32, mut out: &mut [u32]) ->
     // Large tiles are drawn at their own resolution: what is beyond is seldom looked at so closely.
     let drawn = matches!(texture.pattern, Pattern::Family(_));
     let twice = u32::from(drawn && log2_size <= SMALL && fineness > 0);
-    let mut canvas = Canvas::new(1 << (log2_size + twice), texture.period_m[0], texture.colour.map(f32::from));
+    // What is fitted to its surface is large already, and drawn as it will be.
+    let edge = if texture.fitted && twice == 0 { size(fineness) as usize } else { 1 << (log2_size + twice) };
+    let mut canvas = Canvas::new(edge, texture.period_m[0], texture.colour.map(f32::from));
     let mut stream = Seed(texture.seed).stream("texture");
     let mut periods = [1, 1];
     match &texture.pattern {
@@ -193,6 +195,12 @@ mod tests {
             let sizes = sizes(&vec![16.0; count]);
             assert!(sizes.iter().map(|n| texels(*n)).sum::<usize>() <= ATLAS_TEXELS, "{count}");
         }
+        // What covers a wall as a whole is no finer than it must be, and covers it.
+        let fitted = |period_m| Texture { fitted: true, ..texture(TextureFamily::Noise, period_m) };
+        let alone = [5.0, 8.0, 10.0, 100.0].map(|period_m| fineness([fitted(period_m)].iter())[0]);
+        assert_eq!(alone, [38, 40, 42, FINEST]);
+        let fitted = fitted(5.0);
+        assert!(baked(&Surface::new(&fitted, false), 38).1.iter().all(|t| t >> 24 == 0xff));
         // All that was asked for is written: no texel is transparent.
         assert!(baked(&Surface::new(&texture(TextureFamily::Noise, 7.0), false), 40).1.iter().all(|t| t >> 24 == 0xff));
     }

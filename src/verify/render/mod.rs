@@ -81,7 +81,7 @@ pub fn building(rooms: u32) -> Result<World> {
         let (along, line) = (ROOM_M * f64::from(k % rooms), ROOM_M * f64::from(k / rooms + 1));
         let opening = |number: u32| {
             let from_start_m = 0.6 + 0.15 * f64::from((7 * k + 3 * number) % 9);
-            let what = if number % 5 == 0 { "window" } else { "door" };
+            let what = if number.is_multiple_of(5) { "window" } else { "door" };
             format!("{{ kind = \"{what}\", from_start_m = {from_start_m:.2}, width_m = 0.9 }}")
         };
         let ends = [[[along, line], [along + ROOM_M, line]], [[line, along], [line, along + ROOM_M]]];
