@@ -14,7 +14,8 @@
 
 use super::chassis::{Chassis, PlanarVelocity};
 use super::movers::is_solid;
-use super::{Stretches, Struck, TOUCH_GAP_M, Touched};
+use super::stretches::Stretches;
+use super::{Struck, TOUCH_GAP_M, Touched};
 use crate::geometry::{Pose, Vector2, cross};
 use crate::world::grid::bounds_of;
 use crate::world::polygon::{closest_on_segment, contains, edges};

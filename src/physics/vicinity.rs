@@ -7,8 +7,8 @@
 //!
 //! Distances are not measured in every substep either: a gap of 1 m stays a gap until robot and bodies together have gone 1 m.
 
-use super::Stretches;
 use super::movers::is_solid;
+use super::stretches::Stretches;
 use crate::geometry::{Pose, Vector2};
 use crate::world::{Body, Boundary, Footprint, MotionSpec, World};
 
