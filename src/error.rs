@@ -55,6 +55,26 @@ pub enum Error {
         /// The Cargo feature that it comes with.
         feature: &'static str,
     },
+    /// What a file, a set or a folder holds does not serve what was asked for.
+    #[error("{what}: found {found}, needed is {needed}")]
+    Unfit {
+        /// Which part of it.
+        what: String,
+        /// What it is.
+        found: String,
+        /// What would serve.
+        needed: String,
+    },
+    /// The machine has less of something than is needed.
+    #[error("{what}: found {found}, needed is {needed}")]
+    Lacking {
+        /// Of what.
+        what: String,
+        /// What there is.
+        found: String,
+        /// How much would do.
+        needed: String,
+    },
     /// A picture was asked for from inside a body.
     #[error("camera: found ({x_m}, {y_m}, {z_m}) m, inside `{body}`, allowed is a place outside all bodies")]
     CameraInside {
@@ -111,6 +131,43 @@ pub enum Error {
     Interrupted,
 }
 
+/// What kind of thing went wrong: it says who can do something about it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ErrorKind {
+    /// A value that the caller chose is not allowed; another one may be.
+    Usage,
+    /// A file, a folder or a set is not what it has to be; the same call succeeds once it is, or on another one.
+    Input,
+    /// The machine or this build of the program does not give what is needed; the same call may succeed with another one.
+    Environment,
+    /// The work was stopped from outside.
+    Interrupted,
+}
+
+impl Error {
+    /// Which kind of error it is.
+    #[must_use]
+    pub fn kind(&self) -> ErrorKind {
+        match self {
+            Self::Invalid { .. } | Self::CameraInside { .. } => ErrorKind::Usage,
+            Self::Parse { .. }
+            | Self::World { .. }
+            | Self::Unfit { .. }
+            | Self::Image { .. }
+            | Self::OutputTaken { .. }
+            | Self::FileTaken { .. } => ErrorKind::Input,
+            Self::Io { .. }
+            | Self::Lacking { .. }
+            | Self::FeatureOff { .. }
+            | Self::NoAdapter(_)
+            | Self::Gpu(_)
+            | Self::Memory { .. }
+            | Self::Threads(_) => ErrorKind::Environment,
+            Self::Interrupted => ErrorKind::Interrupted,
+        }
+    }
+}
+
 fn format_faults(path: &std::path::Path, faults: &[Fault]) -> String {
     use std::fmt::Write;
     let mut text = format!("{}: {} fault{}", path.display(), faults.len(), if faults.len() == 1 { "" } else { "s" });
@@ -118,4 +175,28 @@ fn format_faults(path: &std::path::Path, faults: &[Fault]) -> String {
         let _ = write!(text, "\n  {f}");
     }
     text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What a caller tells apart, made by the library itself; tests of the command hold the exit codes to the same.
+    #[test]
+    fn errors_say_what_kind_they_are() {
+        let folder = tempfile::tempdir().unwrap();
+        let kind = |error: Error| error.kind();
+        let world = |text: &str| crate::world::World::from_toml(text, "world.toml").unwrap_err();
+        assert_eq!(kind(crate::world::World::open("no-such-world").unwrap_err()), ErrorKind::Usage);
+        assert_eq!(kind(world("name = 1")), ErrorKind::Input);
+        std::fs::write(folder.path().join("thesis.tex"), "mine").unwrap();
+        let taken = crate::storage::OutputFolder::open(folder.path(), "home", &["summary.json"]).unwrap_err();
+        assert_eq!(kind(taken), ErrorKind::Input);
+        let below = crate::storage::OutputFolder::open(&folder.path().join("thesis.tex/below"), "home", &[]).unwrap_err();
+        assert_eq!(kind(below), ErrorKind::Environment);
+        if cfg!(unix) {
+            assert_eq!(kind(crate::storage::check_room(folder.path(), u64::MAX, "a set").unwrap_err()), ErrorKind::Environment);
+        }
+        assert_eq!(kind(Error::Interrupted), ErrorKind::Interrupted);
+    }
 }

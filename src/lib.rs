@@ -124,7 +124,7 @@ pub mod verify;
 pub mod vision;
 pub mod world;
 
-pub use error::{Error, Result};
+pub use error::{Error, ErrorKind, Result};
 
 /// Version of this program and the commit that it was built from, as in `0.1.0 (6278fe7)`; `+changes` follows the commit where
 /// the sources differed from it. Where the commit is not known, as without git, the version stands alone.

@@ -5,7 +5,7 @@ mod cli;
 use std::io::Write;
 use std::process::ExitCode;
 
-use wayhome::Error;
+use wayhome::{Error, ErrorKind};
 
 fn main() -> ExitCode {
     match cli::run() {
@@ -14,10 +14,10 @@ fn main() -> ExitCode {
         Err(error) => {
             // Nobody is left to tell when stderr is gone.
             let _ = writeln!(std::io::stderr(), "error: {error:#}");
-            match error.downcast_ref::<Error>() {
-                Some(Error::Invalid { .. }) => ExitCode::from(2),
-                Some(Error::Interrupted) => ExitCode::from(cli::INTERRUPTED),
-                _ => ExitCode::FAILURE,
+            match error.downcast_ref().map(Error::kind) {
+                Some(ErrorKind::Usage) => ExitCode::from(2),
+                Some(ErrorKind::Interrupted) => ExitCode::from(cli::INTERRUPTED),
+                Some(ErrorKind::Input | ErrorKind::Environment) | None => ExitCode::FAILURE,
             }
         }
     }

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use anyhow::{Result, bail};
+use clap::Args;
 use serde::Serialize;
 use wayhome::episode::{Outcome, Progress, Recorder, Setup, Simulation, Start, Summary};
 use wayhome::geometry::Pose;
@@ -22,39 +23,6 @@ use super::context::{Context, Verdict, folder_or, open_folder};
 use super::setup::{MethodArgs, SetupArgs};
 use super::threads::awake;
 use super::values::{count, ending, pose, range, row, seeds, start};
-
-/// What the row of a study has already. A group of arguments would not do: clap takes it for not given where one of it has a default.
-const NOT_WITH_REPLAY: [&str; 29] = [
-    "world",
-    "changes",
-    "home",
-    "method",
-    "controller",
-    "method_timeout_s",
-    "plant",
-    "bearings",
-    "landmarks",
-    "renderer",
-    "size",
-    "light",
-    "camera",
-    "home_light",
-    "home_camera",
-    "dataset",
-    "dataset_condition",
-    "dataset_home_condition",
-    "dataset_spacing_m",
-    "dataset_home",
-    "noise_deg",
-    "noise_dropout",
-    "noise_false",
-    "compass_deg",
-    "start",
-    "seed",
-    "seeds",
-    "initial_estimate",
-    "time_limit_s",
-];
 
 /// Arguments of `home`.
 #[derive(Debug, clap::Args)]
@@ -78,7 +46,7 @@ pub struct HomeArgs {
     #[arg(long, value_name = "A..B", conflicts_with = "seed", value_parser = seeds)]
     pub seeds: Option<RangeInclusive<u64>>,
     /// Run an episode of a study again, exactly: the study's folder and the episode's number in its rows
-    #[arg(long, value_name = "DIR:ROW", value_parser = row, conflicts_with_all = NOT_WITH_REPLAY)]
+    #[arg(long, value_name = "DIR:ROW", value_parser = row, conflicts_with_all = told_by_a_study())]
     pub replay: Option<(PathBuf, u64)>,
     /// Pose in the home frame at which a filter starts that has to be given one (paper-ekf): x,y,heading_deg
     #[arg(long, value_name = "x,y,heading_deg", allow_hyphen_values = true, value_parser = pose)]
@@ -92,6 +60,15 @@ pub struct HomeArgs {
     /// Folder for the results [default: results/runs/home-WORLD-SEED]
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
+}
+
+/// The arguments that an episode has from its study. Their groups would not do: clap takes one for not given where an argument of it
+/// has a default.
+fn told_by_a_study() -> Vec<clap::Id> {
+    let shared = ChangeArgs::augment_args(clap::Command::new("shared"));
+    let shared = SetupArgs::augment_args(MethodArgs::augment_args(shared));
+    let own = ["world", "start", "seed", "seeds", "initial_estimate"].map(clap::Id::from);
+    shared.get_arguments().map(|arg| arg.get_id().clone()).chain(own).collect()
 }
 
 /// What `--json` prints for a batch: its summary and those of the runs.

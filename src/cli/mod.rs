@@ -34,10 +34,10 @@ pub use context::{INTERRUPTED, Verdict};
 /// Shown under `--help` of all subcommands.
 const EXIT_CODES: &str = "Exit codes:
   0    done; for a single run of `home`: home was reached
-  1    failed: a file, a folder or a device
+  1    failed: what a file or a folder holds does not serve, or the machine lacks something
   2    usage: an argument or one of its values is not allowed
   3    a single run of `home` ended without reaching home
-  130  interrupted by Ctrl-C; nothing half written is left behind";
+  130  interrupted by Ctrl-C; what is finished is kept, nothing half written is left behind";
 
 /// Headless, physics-simulated robot testbed for bearing-only visual homing
 #[derive(Debug, Parser)]

@@ -169,10 +169,10 @@ const PIXEL_BYTES: u64 = 24;
 fn check_memory(projection: &Projection, pictures: usize) -> Result<(), Error> {
     let needed = PIXEL_BYTES * projection.pixels() as u64 * pictures as u64;
     match free_memory() {
-        Some(free) if needed > free => Err(Error::Invalid {
+        Some(free) if needed > free => Err(Error::Lacking {
             what: "panorama size".into(),
             found: format!("{} x {}, which takes up to {} MB", projection.width, projection.height, needed / 1_000_000),
-            allowed: format!("what the {} MB of free memory hold", free / 1_000_000),
+            needed: format!("what the {} MB of free memory hold", free / 1_000_000),
         }),
         _ => Ok(()),
     }

@@ -24,8 +24,8 @@ The same command goes on where a killed one was. The rows in rows.parquet depend
 
 Shards: --shard 2/8 runs every eighth chunk from the second on. Without --shard, an array job of Slurm is a shard by
 SLURM_ARRAY_TASK_ID and SLURM_ARRAY_TASK_COUNT, and an indexed job of Kubernetes one by JOB_COMPLETION_INDEX and
-WAYHOME_SHARDS. Shards may share one folder, or have one each for `sweep merge`, which fails where a row is missing or a folder is
-of another study.";
+WAYHOME_SHARDS. Shards may share one folder, or have one each for `sweep merge`. That fails where a row is missing; and a
+folder of another study is refused.";
 
 /// Arguments of `sweep`.
 #[derive(Debug, clap::Args)]

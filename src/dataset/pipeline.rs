@@ -24,7 +24,7 @@ use crate::panorama_set::{
 };
 use crate::random::Seed;
 use crate::render::{Camera, Renderer, Scene, View};
-use crate::storage::{GrowingFile, free_bytes, io_error, sha256};
+use crate::storage::{GrowingFile, check_room, io_error, sha256};
 
 /// Most frames that wait to be written: fewer, and threads stand still while the file system is busy.
 const QUEUE: usize = 32;
@@ -167,14 +167,8 @@ impl Job<'_> {
         // The nearest folder above that is there already.
         let there = self.out.ancestors().find(|p| p.is_dir()).unwrap_or(Path::new("."));
         let there = if there.as_os_str().is_empty() { Path::new(".") } else { there };
-        match free_bytes(there) {
-            Some(free) if needed > free => Err(Error::Invalid {
-                what: format!("room on the disk of {}", self.out.display()),
-                found: format!("{} MB free", free / 1_000_000),
-                allowed: format!("{} MB, which {frames} frames of about {} kB take", needed / 1_000_000, frame_bytes / 1000),
-            }),
-            _ => Ok(()),
-        }
+        let whose = format!("{frames} frames of about {} kB", frame_bytes / 1000);
+        check_room(there, needed, &format!("{}, for {whose}", self.out.display()))
     }
 
     /// Makes some parts of one condition.

@@ -168,7 +168,11 @@ impl Plan {
         if parts.is_empty() {
             let what = stages.first().and_then(|s| s.left_out.first()).map_or("", |(_, what)| what.as_str());
             let found = format!("{} poses, and the robot can stand at none of them (`{what}` is in the way)", spots.len());
-            return Err(invalid("poses of the set", found, "poses in the room and outside its bodies"));
+            let (what, needed) = ("poses of the set".to_owned(), "poses in the room and outside its bodies".to_owned());
+            return Err(match request.places {
+                Places::Route(_) | Places::Trajectory(_) => Error::Unfit { what, found, needed },
+                Places::Grid { .. } | Places::Random(_) => Error::Invalid { what, found, allowed: needed },
+            });
         }
         Ok(Self { world: world.clone(), stages, parts, projection, request, spots, grid })
     }
@@ -357,7 +361,9 @@ fn random_places(world: &World, count: usize, stream: &mut Stream) -> Result<Vec
     while places.len() < count {
         if tries > TRIES * (places.len() + 10) {
             let found = format!("{} free places in {tries} tries", places.len());
-            return Err(invalid("--random", found, "a room with free places for the robot"));
+            let (what, needed) =
+                (format!("random places in world {}", world.spec.name), "a room with free places for the robot");
+            return Err(Error::Unfit { what, found, needed: needed.into() });
         }
         tries += 1;
         let (u, v) = (uniform(stream), uniform(stream));

@@ -156,14 +156,14 @@ pub type Watch<'a> = dyn FnMut(&DriveStep, &[Collision]) -> Result<ControlFlow<(
 /// kept but what the summary needs, so that a drive may last as long as it likes.
 ///
 /// # Errors
-/// [`Error::Invalid`] when the table is too long for any disk, [`Error::Interrupted`] when `watch` breaks, and what it fails with.
+/// [`Error::Unfit`] when the table is too long for any disk, [`Error::Interrupted`] when `watch` breaks, and what it fails with.
 pub fn drive(world: &World, start: Pose, seed: Seed, commands: &Commands, watch: &mut Watch<'_>) -> Result<DriveSummary> {
     let period_s = world.spec.task.control_period_s;
     if commands.duration_s() / period_s + commands.rows.len() as f64 > MOST_STEPS {
-        return Err(Error::Invalid {
+        return Err(Error::Unfit {
             what: "duration of the commands".into(),
             found: format!("{} s", commands.duration_s()),
-            allowed: format!("{MOST_STEPS} control steps of {period_s} s at most"),
+            needed: format!("{MOST_STEPS} control steps of {period_s} s at most"),
         });
     }
     let mut setup = Setup { start: Start::At(start), ..Setup::default() };

@@ -167,10 +167,10 @@ pub fn build(kind: MethodKind, options: &MethodOptions, briefing: Briefing) -> R
     }
     let least = kind.fewest_landmarks();
     if briefing.home.bearings.len() < least {
-        return Err(Error::Invalid {
+        return Err(Error::Unfit {
             what: "landmarks in the home snapshot".into(),
             found: briefing.home.bearings.len().to_string(),
-            allowed: format!("at least {least}"),
+            needed: format!("at least {least}"),
         });
     }
     let controller = |pace| Controller::new(options.law, pace, briefing.robot, briefing.task);

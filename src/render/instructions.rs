@@ -41,8 +41,8 @@ impl InstructionSet {
             let names: Vec<String> = Self::ALL.iter().filter(|set| set.is_available()).map(ToString::to_string).collect();
             names.join(", ")
         };
-        let invalid = || Error::Invalid { what: "instruction set".into(), found: self.to_string(), allowed: allowed() };
-        self.is_available().then_some(self).ok_or_else(invalid)
+        let lacking = || Error::Lacking { what: "instruction set".into(), found: self.to_string(), needed: allowed() };
+        self.is_available().then_some(self).ok_or_else(lacking)
     }
 }
 

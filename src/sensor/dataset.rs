@@ -57,14 +57,13 @@ impl DatasetField {
         let at_home = whole.clone().only(choice.home_condition.as_deref().unwrap_or(&wanted))?;
         let set = whole.only(&wanted)?;
         let grid = set.grid(choice.spacing_m, choice.home);
-        let invalid = |what: &str, found: String, allowed: &str| Error::Invalid {
-            what: format!("{what} of the set in {}", choice.folder.display()),
-            found,
-            allowed: allowed.into(),
-        };
+        let of_set = |what: &str| format!("{what} of the set in {}", choice.folder.display());
+        let invalid =
+            |what: &str, found: String, allowed: &str| Error::Invalid { what: of_set(what), found, allowed: allowed.into() };
+        let unfit = |what: &str, found: String, needed: &str| Error::Unfit { what: of_set(what), found, needed: needed.into() };
         let untold = || {
             let allowed = "a set that says where its panoramas were taken, or --dataset-spacing-m with a grid";
-            invalid("poses", "none".into(), allowed)
+            unfit("poses", "none".into(), allowed)
         };
         let in_room = set.document().is_some();
         // Poses in the set's own frame.
@@ -92,7 +91,7 @@ impl DatasetField {
                     found = format!("{found}, in a set of the world `{other}`");
                 }
                 let allowed = format!("a panorama within {most} m of the home of `{}`", world.spec.name);
-                return Err(invalid("home panorama", found, &allowed));
+                return Err(unfit("home panorama", found, &allowed));
             }
             if choice.home.is_some() && choice.home != place_of(nearest) {
                 let allowed = format!("{}, where the set has its home", named(place_of(nearest)));
@@ -106,7 +105,7 @@ impl DatasetField {
             let found = (0..own_at_home.len()).find(|k| home_place.is_none() || place_of(*k) == home_place);
             let found = found.ok_or_else(|| {
                 let found = format!("none at place {}", named(home_place));
-                invalid("home panorama", found, "a place with a panorama; see --dataset-home")
+                unfit("home panorama", found, "a place with a panorama; see --dataset-home")
             })?;
             if choice.home.is_none() {
                 let (folder, picture) = (choice.folder.display(), at_home.entries()[found].path().display());

@@ -248,6 +248,21 @@ pub fn free_bytes(folder: &Path) -> Option<u64> {
     }
 }
 
+/// Refuses to begin what an existing folder's disk has no room for; `what` says whose room it is.
+///
+/// # Errors
+/// [`Error::Lacking`] when the system tells that fewer than `needed` bytes are free.
+pub fn check_room(folder: &Path, needed: u64, what: &str) -> Result<()> {
+    match free_bytes(folder) {
+        Some(free) if needed > free => Err(Error::Lacking {
+            what: format!("room on the disk of {what}"),
+            found: format!("{} MB free", free / 1_000_000),
+            needed: format!("{} MB", needed / 1_000_000),
+        }),
+        _ => Ok(()),
+    }
+}
+
 /// Bytes of memory that are free; `None` where the system does not tell.
 #[must_use]
 pub fn free_memory() -> Option<u64> {

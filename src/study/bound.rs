@@ -94,12 +94,14 @@ impl BoundSettings {
             let allowed = format!("1 to {}, as many as there are seeds", last.saturating_add(1));
             return invalid("runs in a group", group.to_string(), &allowed);
         }
+        let unfit =
+            |what: &str, found: String, needed: &str| Err(Error::Unfit { what: what.into(), found, needed: needed.into() });
         let offset = world.spec.camera.offset_m;
         if offset != [0.0; 2] {
-            return invalid("camera.offset_m of the world", format!("{offset:?}"), "[0.0, 0.0]: bearings from above the axle");
+            return unfit("camera.offset_m of the world", format!("{offset:?}"), "[0.0, 0.0]: bearings from above the axle");
         }
         match world.landmarks().iter().find(|l| l.motion.is_some()) {
-            Some(body) => invalid("landmarks of the world", format!("`{}`, which moves", body.name), "landmarks at rest"),
+            Some(body) => unfit("landmarks of the world", format!("`{}`, which moves", body.name), "landmarks at rest"),
             None => Ok(()),
         }
     }

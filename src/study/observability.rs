@@ -110,10 +110,10 @@ pub fn map(world: &World, facing: Facing, spacing_m: f64) -> Result<Observabilit
     let seen_at_home: Vec<(u32, Vector2<f64>)> =
         at_home.bearings.iter().map(|b| (b.id.0, world.home.inverse_transform(bodies[b.id.0 as usize].position()))).collect();
     if seen_at_home.len() < 3 {
-        return Err(Error::Invalid {
+        return Err(Error::Unfit {
             what: format!("landmarks of world `{}` that home sees", world.spec.name),
             found: seen_at_home.len().to_string(),
-            allowed: "at least 3".into(),
+            needed: "at least 3".into(),
         });
     }
     let length_m = seen_at_home.iter().map(|(_, l)| l.norm()).sum::<f64>() / seen_at_home.len() as f64;

@@ -111,7 +111,7 @@ pub fn run(study: &Study, pool: &Pool<'_>, watch: &(dyn Fn(&Row) + Sync)) -> Res
     rows.sort_by_key(|row| row.episode);
     if let Some(row) = rows.iter().find(|row| matches!(row.run.outcome, Ending::Error | Ending::Panic)) {
         let (what, found) = (format!("run of seed {}", row.run.seed), row.run.reason.clone());
-        return Err(Error::Invalid { what, found, allowed: "a world and a setup in which every run can be run".into() });
+        return Err(Error::Unfit { what, found, needed: "a world and a setup in which every run can be run".into() });
     }
     let mut cells = Vec::new();
     for &axis in Axis::VARIANTS {

@@ -146,13 +146,13 @@ impl World {
             }
         }
         let worst = refusals.iter().max_by_key(|(_, count)| **count);
-        Err(Error::Invalid {
+        Err(Error::Unfit {
             what: format!("random start in world {}", self.spec.name),
             found: format!(
                 "no free place in {START_TRIES} tries{}",
                 worst.map_or_else(String::new, |(reason, count)| format!("; {count} times {reason} was in the way"))
             ),
-            allowed: format!(
+            needed: format!(
                 "a start region with free places {} to {} m from home, {} m of clearance and a straight free way home",
                 start.min_distance_m, start.max_distance_m, start.clearance_m
             ),

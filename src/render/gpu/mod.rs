@@ -138,7 +138,7 @@ impl GpuRenderer {
             let adapter = &self.shared.info.adapter;
             let allowed = format!("up to {pixels} pixels in that many columns, and {columns} columns, on {adapter}");
             let found = format!("{} x {} = {} pixels", p.width, p.height, p.pixels());
-            return Err(Error::Invalid { what: "panorama size".to_owned(), found, allowed });
+            return Err(Error::Lacking { what: "panorama size".to_owned(), found, needed: allowed });
         }
         if p.height > MAX_ROWS {
             let (found, allowed) = (format!("{} rows", p.height), format!("up to {MAX_ROWS} on a graphics adapter"));
@@ -168,7 +168,7 @@ impl GpuRenderer {
             if tiles > most {
                 let found = format!("{tiles} tiles of {TILE} x {TILE} texels");
                 let allowed = format!("up to {most} on {}", self.shared.info.adapter);
-                return Err(Error::Invalid { what: "textures of all surfaces".to_owned(), found, allowed });
+                return Err(Error::Lacking { what: "textures of all surfaces".to_owned(), found, needed: allowed });
             }
             moved |= self.materials.write(device, queue, bytemuck::cast_slice(&materials));
             moved |= self.atlas.write(device, queue, bytemuck::cast_slice(&texels));

@@ -4,6 +4,7 @@ use std::fmt::Write;
 
 use super::figures::{Figure, Section, Sums};
 use super::gallery::pictures;
+use crate::command_line::command_line;
 use crate::study::sweep::store::Rate;
 use crate::study::sweep::{Design, Exhibit};
 use crate::study::tally::{OutcomeCounts, Tally};
@@ -210,14 +211,14 @@ impl Page<'_> {
         for exhibit in self.exhibits {
             let row = &exhibit.row;
             let _ = write!(text, "<figure>{}", pictures(exhibit));
+            let again = command_line(["home", "--replay", &format!("{}:{}", self.folder, row.episode)]);
             let _ = writeln!(
                 text,
-                "<figcaption><b>{}</b>: {}<br>{}<br><code>wayhome home --replay {}:{}</code></figcaption></figure>",
+                "<figcaption><b>{}</b>: {}<br>{}<br><code>{}</code></figcaption></figure>",
                 row.run.outcome,
                 escaped(&row.run.reason),
                 escaped(&self.sums.study.place_in_words(row)),
-                escaped(&self.folder),
-                row.episode
+                escaped(&again)
             );
         }
         *text += "</div>\n";

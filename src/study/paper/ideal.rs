@@ -60,10 +60,10 @@ impl Ideal {
         let home = world.home;
         let landmarks: Vec<_> = world.landmarks().iter().map(|body| home.inverse_transform(body.pose.position())).collect();
         if landmarks.len() < 3 {
-            return Err(Error::Invalid {
+            return Err(Error::Unfit {
                 what: format!("landmarks of world `{}`", world.spec.name),
                 found: landmarks.len().to_string(),
-                allowed: "at least 3".into(),
+                needed: "at least 3".into(),
             });
         }
         let starts = STARTS.into_iter().map(|name| Ok((name, home.to_local(&world.named_start(name)?))));

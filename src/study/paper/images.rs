@@ -68,10 +68,10 @@ impl ImageSet {
     pub fn open(self, folder: &Path) -> Result<PanoramaSet> {
         let (files, grid) = (PanoramaSet::open_as(folder, self.layout())?.whole()?, self.grid());
         if files.shape() != (grid.rows, grid.columns) {
-            return Err(Error::Invalid {
+            return Err(Error::Unfit {
                 what: format!("grid of the set in {}", folder.display()),
                 found: format!("{} x {} places", files.shape().0, files.shape().1),
-                allowed: format!("{} x {}", grid.rows, grid.columns),
+                needed: format!("{} x {}", grid.rows, grid.columns),
             });
         }
         Ok(files)

@@ -81,10 +81,10 @@ impl ObjectField {
             let panorama = load(*place)?;
             if panorama.projection != projection {
                 let size = |p: crate::panorama::Projection| format!("{} x {}", p.width, p.height);
-                return Err(Error::Invalid {
+                return Err(Error::Unfit {
                     what: format!("size of the panorama at ({}, {})", place.i, place.j),
                     found: size(panorama.projection),
-                    allowed: format!("that of the panorama at home, {}", size(projection)),
+                    needed: format!("that of the panorama at home, {}", size(projection)),
                 });
             }
             extractor.observe(&panorama);
@@ -100,10 +100,10 @@ impl ObjectField {
                 seen_rad: matches.iter().map(|m| Some(projection.azimuth(detect(m, column, width)?))).collect(),
             })
             .collect();
-        let objects = choose(&candidates).ok_or_else(|| Error::Invalid {
+        let objects = choose(&candidates).ok_or_else(|| Error::Unfit {
             what: "objects in the home panorama that are found elsewhere".into(),
             found: "fewer than three that lie 60 degrees apart".into(),
-            allowed: "at least three".into(),
+            needed: "at least three".into(),
         })?;
         let matches_mean = matches.iter().map(Vec::len).sum::<usize>() as f64 / places.len().max(1) as f64;
         Ok((home, Self { grid, objects, size_px: [projection.width, projection.height], matches_mean }))

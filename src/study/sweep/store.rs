@@ -115,10 +115,10 @@ impl StudyFolder {
     /// When it is none, or the study's world or this program has changed since.
     pub fn open(path: &Path) -> Result<Self> {
         if !path.join(RECORD).is_file() {
-            return Err(Error::Invalid {
+            return Err(Error::Unfit {
                 what: "folder of a study".into(),
                 found: format!("{}, which has no {RECORD}", path.display()),
-                allowed: "a folder that `wayhome sweep` made".into(),
+                needed: "a folder that `wayhome sweep` made".into(),
             });
         }
         let record = read_record(path)?;
@@ -190,7 +190,11 @@ impl StudyFolder {
         }
         let chunk = self.study.chunk_of(episode);
         let rows = if self.done()?.contains(&chunk) { self.read(&self.part(chunk))? } else { Vec::new() };
-        let missing = || invalid(format!("{episode}, which is not run yet"), "an episode whose row is there".into());
+        let missing = || Error::Unfit {
+            what: format!("rows in {}", self.path.display()),
+            found: format!("none of episode {episode}, which is not run yet"),
+            needed: "its row".into(),
+        };
         rows.into_iter().find(|row| row.episode == episode).ok_or_else(missing)
     }
 
@@ -237,10 +241,10 @@ impl StudyFolder {
         let record = read_record(other)?;
         let held = Identity { study: record.study, sha256: record.study_sha256, version: record.version };
         if let Some(difference) = held.difference(&Identity::of(&self.study)) {
-            return Err(Error::Invalid {
+            return Err(Error::Unfit {
                 what: format!("shard {}", other.display()),
                 found: format!("rows of {difference}"),
-                allowed: "shards of one study, made by one version".into(),
+                needed: "shards of one study, made by one version".into(),
             });
         }
         let from = Self { path: other.to_owned(), study: self.study.clone(), source: record.source, keep_failures: false };
