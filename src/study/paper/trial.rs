@@ -129,12 +129,15 @@ pub fn run<'a>(world: &'a World, setup: &Setup, start: Pose, eyes: Eyes<'a>) -> 
     Ok(Track::of(&record, &world.spec.task))
 }
 
+/// What is seen from a pose in the home frame.
+pub type Look<'a> = Box<dyn FnMut(&Pose) -> Vec<Bearing> + Send + 'a>;
+
 /// What sees landmarks.
 pub struct Eyes<'a> {
     /// What they saw at home.
     pub home: HomeSnapshot,
     /// What they see from a pose in the home frame. They may count their looks, to draw noise.
-    pub look: Box<dyn FnMut(&Pose) -> Vec<Bearing> + Send + 'a>,
+    pub look: Look<'a>,
     /// Whether a compass comes with them that tells the true heading.
     pub compass: bool,
 }
