@@ -12,6 +12,7 @@ mod compare;
 mod context;
 mod dataset;
 mod drive;
+mod generate;
 mod home;
 mod observability;
 mod render;

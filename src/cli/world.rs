@@ -25,6 +25,8 @@ pub enum WorldCommand {
         /// World file, or the name of a built-in world
         world: String,
     },
+    /// Make worlds from a seed: rooms without end
+    Generate(Box<super::generate::GenerateArgs>),
     /// Draw a world from above as SVG
     Plot {
         /// World file, or the name of a built-in world
@@ -55,6 +57,7 @@ struct Checked<'a> {
 pub fn run(args: &WorldArgs, context: &Context) -> Result<Verdict> {
     match &args.command {
         WorldCommand::Check { world } => check(&World::open(world)?, context)?,
+        WorldCommand::Generate(args) => return super::generate::run(args, context),
         WorldCommand::Plot { world, out } => {
             let drawing = map::world_svg(&World::open(world)?);
             match out {

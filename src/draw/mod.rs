@@ -6,5 +6,9 @@ pub mod chart;
 pub mod image;
 pub mod map;
 pub mod markdown;
+#[cfg(feature = "video")]
+pub(crate) mod raster;
 pub(crate) mod shapes;
 pub mod sheet;
+#[cfg(feature = "video")]
+pub mod worlds;

@@ -4,6 +4,7 @@ use foxglove::messages::{Color, Odometry, Point3, Pose as FoxglovePose, Quaterni
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use crate::draw::map::paint;
 use crate::episode::{Belief, Step};
 use crate::geometry::{Pose, Twist, Vector2, sin_cos};
 use crate::observation::Estimate;
@@ -38,13 +39,8 @@ pub(super) fn pose(pose: &Pose, z: f64) -> FoxglovePose {
 
 /// A colour from the `#rrggbb` that drawings have.
 pub(super) fn colour(hex: &str, opacity: f64) -> Color {
-    let [r, g, b] = rgb(hex).map(|c| f64::from(c) / 255.0);
+    let [r, g, b] = paint::rgb(hex).map(|c| f64::from(c) / 255.0);
     Color { r, g, b, a: opacity }
-}
-
-/// Red, green and blue of `#rrggbb`.
-pub(super) fn rgb(hex: &str) -> [u8; 3] {
-    [1, 3, 5].map(|at| hex.get(at..at + 2).and_then(|digits| u8::from_str_radix(digits, 16).ok()).unwrap_or(0))
 }
 
 /// Where a body is by wheel odometry, with the speeds that it measured.

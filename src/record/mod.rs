@@ -15,8 +15,6 @@ mod mcap_file;
 #[cfg(feature = "recording")]
 mod messages;
 pub mod path_plot;
-#[cfg(feature = "video")]
-mod raster;
 pub mod run;
 #[cfg(feature = "recording")]
 mod scene;

@@ -14,7 +14,7 @@ use image::imageops::FilterType;
 use image::{Rgb, RgbImage};
 
 use super::file::{self, Kind, MAKER};
-use super::raster::{RoomRaster, Sight};
+use crate::draw::raster::{RoomRaster, Sight};
 use crate::episode::{Moment, Record, Recorder, Summary};
 use crate::error::{Error, Result};
 use crate::geometry::Pose;

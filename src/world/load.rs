@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 use sha2::{Digest, Sha256};
 
+use super::generate::{Kind, Knobs, generate};
 use super::grid::Grid;
 use super::picture::{Gallery, Pictures};
 use super::polygon::{anticlockwise, signed_area};
@@ -24,6 +25,8 @@ use crate::panorama::INSTANCE_FIRST_WALL;
 
 /// Marks the source of a world that the program carries with it.
 const BUILTIN_SOURCE: &str = "builtin:";
+/// Marks the source of a world that was generated when it was opened.
+const GENERATED_SOURCE: &str = "generated:";
 /// The worlds that the program carries with it, as (name, TOML text).
 const BUILTIN: [(&str, &str); 8] = [
     ("lab", include_str!("../../worlds/lab.toml")),
@@ -45,8 +48,8 @@ const BUILTIN_IMAGES: [(&str, &[u8]); 2] = [
 const PANE_M: f64 = 0.01;
 
 impl World {
-    /// Opens a world by what a person typed: the path of a file if there is one, else the name of a built-in world, as `NAME`
-    /// or `worlds/NAME.toml`.
+    /// Opens a world by what a person typed: the path of a file if there is one, else a generated world as `KIND:SEED`
+    /// (`office:17`), or the name of a built-in world, as `NAME` or `worlds/NAME.toml`.
     ///
     /// # Errors
     /// When there is neither, and as [`World::load`].
@@ -243,12 +246,18 @@ fn read_file(path: &Path) -> Result<String> {
     std::fs::read_to_string(path).map_err(|source| Error::Io { action: "read", path: path.to_owned(), source })
 }
 
-/// Text and source of the world that a person named: the path of a file if there is one, else the name of a built-in world, as
-/// `NAME` or `worlds/NAME.toml`.
+/// Text and source of the world that a person named: the path of a file if there is one, else a generated world as `KIND:SEED`, or
+/// the name of a built-in world, as `NAME` or `worlds/NAME.toml`.
 pub(super) fn read(argument: &str) -> Result<(String, PathBuf)> {
     let path = Path::new(argument);
     if path.is_file() {
         return Ok((read_file(path)?, path.to_owned()));
+    }
+    if let Some((kind, seed)) = argument.split_once(':')
+        && let (Ok(kind), Ok(seed)) = (kind.parse::<Kind>(), seed.parse())
+    {
+        let world = generate(kind, seed, &Knobs::default())?;
+        return Ok((world.toml, PathBuf::from(format!("{GENERATED_SOURCE}{argument}"))));
     }
     let bare = argument.strip_prefix("worlds/").unwrap_or(argument);
     let bare = bare.strip_suffix(".toml").unwrap_or(bare);
@@ -257,7 +266,10 @@ pub(super) fn read(argument: &str) -> Result<(String, PathBuf)> {
         None => Err(Error::Invalid {
             what: "world".to_owned(),
             found: format!("{argument}, which is no file"),
-            allowed: format!("a world file (TOML or JSON), or a built-in world: {}", World::builtin_names().join(", ")),
+            allowed: format!(
+                "a world file (TOML or JSON), a generated world as KIND:SEED (office:17), or a built-in world: {}",
+                World::builtin_names().join(", ")
+            ),
         }),
     }
 }

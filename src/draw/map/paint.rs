@@ -17,7 +17,7 @@ pub(crate) const HOME: &str = "#c0143c";
 /// End of a run.
 pub(super) const END: &str = "#0072b2";
 /// Named starts and the start region.
-pub(super) const STARTS: &str = "#4a7a2c";
+pub(crate) const STARTS: &str = "#4a7a2c";
 
 /// How a kind of body is filled and outlined.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -127,4 +127,10 @@ pub(super) fn pointer(centre: Vector2<f64>, size: f64, heading_rad: f64) -> Path
         .set("fill", STARTS)
         .set("stroke", "#ffffff")
         .set("stroke-width", 0.8)
+}
+
+/// Red, green and blue of `#rrggbb`.
+#[cfg(any(feature = "recording", feature = "video"))]
+pub(crate) fn rgb(hex: &str) -> [u8; 3] {
+    [1, 3, 5].map(|at| hex.get(at..at + 2).and_then(|digits| u8::from_str_radix(digits, 16).ok()).unwrap_or(0))
 }

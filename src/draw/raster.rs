@@ -2,9 +2,9 @@
 
 use tiny_skia::{Color, FillRule, LineCap, LineJoin, Paint, Path, PathBuilder, Pixmap, Stroke, StrokeDash, Transform};
 
-use super::messages::rgb;
-use crate::draw::map::paint::{BodyPaint, HOME, INK, SEEN_THROUGH, WALL, friction_colour};
-use crate::draw::map::{PathStyle, ellipse_axes};
+use super::map::paint::{BodyPaint, HOME, SEEN_THROUGH, STARTS, WALL, friction_colour, rgb};
+use super::map::{PathStyle, ellipse_axes};
+use super::shapes::INK;
 use crate::geometry::{Pose, Vector2, direction};
 use crate::world::polygon::bounds;
 use crate::world::{Body, Footprint, World};
@@ -15,11 +15,13 @@ const MARGIN_PX: f64 = 14.0;
 const WALL_PX: f32 = 8.0;
 /// Least radius of a disc, so that it can be seen, px.
 const LEAST_RADIUS_PX: f32 = 3.5;
+/// Windows.
+const WINDOW: &str = "#56b4e9";
 /// Standard deviations that an ellipse covers.
 const K_SIGMA: f64 = 2.0;
 
 /// What changes from frame to frame.
-pub(super) struct Sight<'a> {
+pub(crate) struct Sight<'a> {
     /// True path so far.
     pub truth: &'a [Pose],
     /// Estimated path so far in the room; what is not finite breaks the line.
@@ -31,7 +33,7 @@ pub(super) struct Sight<'a> {
 }
 
 /// A room, ready to be drawn again and again.
-pub(super) struct RoomRaster<'a> {
+pub(crate) struct RoomRaster<'a> {
     world: &'a World,
     px_per_m: f64,
     /// Corner of the room's bounds with the least x and the greatest y, and where it is in the picture.
@@ -43,7 +45,7 @@ pub(super) struct RoomRaster<'a> {
 
 impl<'a> RoomRaster<'a> {
     /// A picture `width_px` wide and at most `height_px` high, as high as the room needs; `None` where there is no room for one.
-    pub(super) fn new(world: &'a World, width_px: u32, height_px: u32) -> Option<Self> {
+    pub(crate) fn new(world: &'a World, width_px: u32, height_px: u32) -> Option<Self> {
         let (low, high) = bounds(&world.outline);
         let size = high - low;
         let free = |px: u32| f64::from(px) - 2.0 * MARGIN_PX;
@@ -57,7 +59,7 @@ impl<'a> RoomRaster<'a> {
         Some(raster)
     }
 
-    pub(super) fn height_px(&self) -> u32 {
+    pub(crate) fn height_px(&self) -> u32 {
         self.still.height()
     }
 
@@ -120,8 +122,23 @@ impl<'a> RoomRaster<'a> {
         stroke(onto, shape.as_ref(), paint.line, 1.2, if hangs { &[4.0, 3.0] } else { &[] });
     }
 
+    /// The room at time 0, with its windows and named starts.
+    pub(crate) fn at_rest(&self) -> Pixmap {
+        let mut picture = self.draw(&Sight { truth: &[], estimate: &[], covariance: None, bodies: &self.world.body_poses() });
+        for window in &self.world.windows {
+            if let [a, b, ..] = window.footprint[..] {
+                stroke(&mut picture, polyline(&[self.at(a), self.at(b)]).as_ref(), WINDOW, 3.0, &[]);
+            }
+        }
+        for start in &self.world.spec.start.named {
+            let at = self.at(Vector2::new(start.x_m, start.y_m));
+            stroke(&mut picture, disc(at, LEAST_RADIUS_PX).as_ref(), STARTS, 1.5, &[]);
+        }
+        picture
+    }
+
     /// The room at one moment.
-    pub(super) fn draw(&self, sight: &Sight<'_>) -> Pixmap {
+    pub(crate) fn draw(&self, sight: &Sight<'_>) -> Pixmap {
         let mut picture = self.still.clone();
         for (k, (body, at)) in self.world.bodies.iter().zip(sight.bodies).enumerate().filter(|(_, (b, _))| b.motion.is_some()) {
             self.draw_body(&mut picture, k, body, at);
