@@ -213,6 +213,30 @@ fn faults_of_a_study_are_told_before_anything_runs() {
     assert_eq!(fs::read_dir(at.join("precious")).unwrap().count(), 1, "nothing is left behind");
 }
 
+/// Each seed has a room of its own, the same for all methods; a run of the room by itself is the same run.
+#[test]
+fn a_study_may_draw_a_world_for_each_seed() {
+    let text = "name = \"drawn\"\nworld = \"lab:seed\"\nseeds = \"3..4\"\n[settings]\nbearings = \"ideal\"\ntime_limit_s = 40\n\
+                [[axes]]\nsetting = \"world\"\nvalues = [\"office:seed\", \"bare:seed\"]\n\
+                [[axes]]\nsetting = \"method\"\nvalues = [\"anchored-ekf\", \"alv\"]\n";
+    let base = tempfile::tempdir().unwrap();
+    let at = base.path();
+    fs::write(at.join("drawn.toml"), text).unwrap();
+    done(wayhome(at, &["sweep", "drawn.toml", "--out", "rows"]));
+    let table = Table::from_parquet(fs::read(at.join("rows/rows.parquet")).unwrap()).unwrap();
+    let [Some(Cells::Real(starts)), Some(Cells::Real(ends))] = ["start_x_m", "final_distance_m"].map(|name| table.column(name))
+    else {
+        panic!()
+    };
+    assert!(starts[0] == starts[2] && starts[1] == starts[3] && starts[0] != starts[1], "one seed, one room: {starts:?}");
+    assert!(starts[4] != starts[0], "another kind, another room");
+    let alone = ["home", "office:4", "--seed", "4", "--bearings", "ideal", "--time-limit-s", "40", "--json", "--out", "alone"];
+    let told: serde_json::Value = serde_json::from_slice(&wayhome(at, &alone).output().unwrap().stdout).unwrap();
+    assert!((told["final_distance_m"].as_f64().unwrap() - ends[1].unwrap()).abs() < 1e-12);
+    fs::write(at.join("none.toml"), text.replace("bare:seed", "castle:seed")).unwrap();
+    refused(&wayhome(at, &["sweep", "none.toml", "--out", "none"]).output().unwrap(), 2, &["castle"]);
+}
+
 #[test]
 fn built_in_studies_can_be_run() {
     for (name, cells, episodes) in [
@@ -221,6 +245,7 @@ fn built_in_studies_can_be_run() {
         ("light-camera", 50, 1000),
         ("faults-sobol", 768, 3072),
         ("robustness", 26, 1040),
+        ("rooms", 28, 2800),
     ] {
         let study = Study::open(name, None).unwrap_or_else(|error| panic!("{name}: {error}"));
         assert_eq!((study.cells(), study.episodes()), (cells, episodes), "{name}");
@@ -228,10 +253,12 @@ fn built_in_studies_can_be_run() {
         assert_eq!(covered, episodes, "{name}: every episode is in a chunk");
         // Between listed levels everything was checked by opening it; of sampled points some are.
         for cell in (0..cells).step_by(7) {
-            study.case(&study.values(cell)).unwrap_or_else(|error| panic!("{name}, cell {cell}: {error}"));
+            study
+                .case(&study.values(cell), *study.seeds.start())
+                .unwrap_or_else(|error| panic!("{name}, cell {cell}: {error}"));
         }
     }
-    assert_eq!(Study::builtin_names().len(), 5, "the list above has all of them");
+    assert_eq!(Study::builtin_names().len(), 6, "the list above has all of them");
 }
 
 /// The interpreter with the packages of `tests/outside/requirements.txt`, where `.ci/run` or a person has made one.

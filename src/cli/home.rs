@@ -103,7 +103,7 @@ fn replay(args: &HomeArgs, context: &Context, folder: &Path, episode: u64) -> Re
     let held = StudyFolder::open(folder)?;
     let row = held.row(episode)?;
     let study = held.study();
-    let (world, setup) = study.case(&row.values)?;
+    let (world, setup) = study.case(&row.values, row.run.seed)?;
     let summary = single(args, context, &world, &setup, row.run.seed, [&study.name, &episode.to_string()])?;
     let again = Row::of(episode, row.cell, &row.values, &summary);
     if again != row {

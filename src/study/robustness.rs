@@ -163,10 +163,10 @@ mod tests {
         let all = study("slippery", &setup, &[], &(1..=1)).unwrap();
         assert_eq!((all.cells(), all.chunks()), (8 + 7 + 5 + 6, 26));
         let world = World::open("slippery").unwrap();
-        let (icy, usual) = all.case(&all.values(8 + 6)).unwrap();
+        let (icy, usual) = all.case(&all.values(8 + 6), 1).unwrap();
         assert!(icy.zones.is_empty() && icy.bodies == world.bodies && icy.wall_textures == world.wall_textures);
         assert_eq!((icy.friction_at(world.home.position()), &usual), (0.1, &setup), "ice, and nothing else");
-        let (dry, hidden) = all.case(&all.values(7)).unwrap();
+        let (dry, hidden) = all.case(&all.values(7), 1).unwrap();
         assert_eq!((dry, hidden.degradation.hidden), (world, 0.7));
         let named = study("lab", &setup, &[Axis::FalseMatches, Axis::Hidden], &(1..=3)).unwrap();
         let result = run(&named, &Pool::new(2), &|_| ()).unwrap();

@@ -14,7 +14,6 @@ use crate::episode::Setup;
 use crate::error::{Error, Result};
 use crate::fault::Fault;
 use crate::render::RendererChoice;
-use crate::world::Draft;
 
 /// Reads the file's tree and gathers its faults.
 pub(super) struct Reader<'a> {
@@ -61,16 +60,16 @@ impl<'a> Reader<'a> {
             self.fault(tree, "name", format!("\"{name}\""), "letters, digits, - and _");
         }
         let world = self.world(tree)?;
-        let world_sha256 = match Draft::open(&world).and_then(|draft| draft.world()) {
+        let seeds = match seeds {
+            Some(seeds) => seeds,
+            None => self.seeds(tree)?,
+        };
+        let world_sha256 = match settings::open(&world, *seeds.start()).and_then(|draft| draft.world()) {
             Ok(world) => world.sha256,
             Err(error) => {
                 self.fault(tree, "world", format!("\"{world}\""), error.to_string());
                 return None;
             }
-        };
-        let seeds = match seeds {
-            Some(seeds) => seeds,
-            None => self.seeds(tree)?,
         };
         let design = match tree.get("design") {
             None => Design::Grid,

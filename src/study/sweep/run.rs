@@ -7,7 +7,7 @@ use super::duels::failures;
 use super::rows::{Row, without_result};
 use super::spec::{Chunk, Study};
 use super::value::Value;
-use crate::episode::{Record, Setup, Summary};
+use crate::episode::{Record, Setup, Simulation, Summary};
 use crate::error::{Error, Result};
 use crate::study::pool::{Broken, Pool, Scenes};
 use crate::study::row::Ending;
@@ -83,30 +83,57 @@ fn run_chunk(
     halted: &dyn Fn() -> bool,
 ) -> Result<Vec<Row>> {
     let values: Arc<[Value]> = study.values(chunk.cell).into();
-    let case = study.case(&values);
-    let mut bench = None;
+    let shared = (!study.draws_worlds()).then(|| study.case(&values, chunk.seed));
+    let mut ready = None;
     let mut rows = Vec::new();
     for (number, seed) in (chunk.first..).zip(chunk.seed..).take(chunk.count as usize) {
-        let failed = |outcome, reason| without_result(number, (chunk.cell, seed), &values, outcome, reason);
-        let row = match &case {
-            Err(error) => failed(Ending::Error, in_full(error)),
-            Ok((world, setup)) => match scenes.episode(&mut bench, (world, setup), (seed, None), halted) {
-                Ok((record, summary)) => {
-                    let row = Row::of(number, chunk.cell, &values, &summary);
-                    if !row.run.is_home() {
-                        store.keep_failure(&Failure { row: &row, world, record: &record, summary: &summary })?;
-                    }
-                    row
-                }
-                Err(Broken::Error(Error::Interrupted)) => return Err(Error::Interrupted),
-                Err(Broken::Error(error)) => failed(Ending::Error, in_full(&error)),
-                Err(Broken::Panic(reason)) => failed(Ending::Panic, reason),
-            },
+        let episode = Episode { number, seed, cell: chunk.cell, values: &values };
+        let row = match &shared {
+            Some(case) => episode.run(case, &mut ready, scenes, store, halted)?,
+            None => episode.run(&study.case(&values, seed), &mut None, scenes, store, halted)?,
         };
         watch(&row);
         rows.push(row);
     }
     Ok(rows)
+}
+
+/// An episode of a study.
+struct Episode<'a> {
+    number: u64,
+    seed: u64,
+    cell: u64,
+    values: &'a Arc<[Value]>,
+}
+
+impl Episode<'_> {
+    /// Its row, whatever becomes of it but an interruption; `ready` is the simulation of the case, kept from one episode to the next.
+    fn run<'c>(
+        &self,
+        case: &'c Result<(World, Setup)>,
+        ready: &mut Option<Simulation<'c>>,
+        scenes: &Scenes,
+        store: &dyn Store,
+        halted: &dyn Fn() -> bool,
+    ) -> Result<Row> {
+        let failed = |outcome, reason| without_result(self.number, (self.cell, self.seed), self.values, outcome, reason);
+        let (world, setup) = match case {
+            Ok((world, setup)) => (world, setup),
+            Err(error) => return Ok(failed(Ending::Error, in_full(error))),
+        };
+        Ok(match scenes.episode(ready, (world, setup), (self.seed, None), halted) {
+            Ok((record, summary)) => {
+                let row = Row::of(self.number, self.cell, self.values, &summary);
+                if !row.run.is_home() {
+                    store.keep_failure(&Failure { row: &row, world, record: &record, summary: &summary })?;
+                }
+                row
+            }
+            Err(Broken::Error(Error::Interrupted)) => return Err(Error::Interrupted),
+            Err(Broken::Error(error)) => failed(Ending::Error, in_full(&error)),
+            Err(Broken::Panic(reason)) => failed(Ending::Panic, reason),
+        })
+    }
 }
 
 /// Runs one episode of a study again.
@@ -120,7 +147,7 @@ pub fn replay(study: &Study, number: u64) -> Result<(World, Setup, Record, Summa
     }
     let (cell, seed) = study.place(number);
     let values: Arc<[Value]> = study.values(cell).into();
-    let (world, setup) = study.case(&values)?;
+    let (world, setup) = study.case(&values, seed)?;
     let ran = Scenes::of(&Pool::new(1)).episode(&mut None, (&world, &setup), (seed, None), &|| false);
     let (record, summary) = ran.map_err(Broken::into_error)?;
     let row = Row::of(number, cell, &values, &summary);

@@ -31,6 +31,24 @@ pub struct Case {
     pub draft: Draft,
     /// All else.
     pub setup: Setup,
+    /// Seed of the episode, by which a world may be drawn.
+    pub seed: u64,
+}
+
+/// Ending of a generated world that each seed of a study has one of: `office:seed`.
+const DRAWN: &str = ":seed";
+
+/// Whether a world's name stands for one a seed.
+pub(super) fn is_drawn(world: &str) -> bool {
+    world.ends_with(DRAWN)
+}
+
+/// Opens a world by name, for the episode of a seed.
+pub(super) fn open(world: &str, seed: u64) -> Result<Draft> {
+    match world.strip_suffix(DRAWN) {
+        Some(kind) => Draft::open(&format!("{kind}:{seed}")),
+        None => Draft::open(world),
+    }
 }
 
 /// What a value did not fit: what is allowed instead.
@@ -39,10 +57,15 @@ type Apply = fn(&mut Case, &Value) -> std::result::Result<(), Refusal>;
 
 /// Key, default, meaning and effect of each setting but those of `world.`, `filter.` and `extractor.`.
 const SETTINGS: &[(&str, &str, &str, Apply)] = &[
-    ("world", "the study's", "world file or built-in world", |case, value| {
-        case.draft = Draft::open(text(value)?).map_err(|e| e.to_string())?;
-        Ok(())
-    }),
+    (
+        "world",
+        "the study's",
+        "world file, built-in world, or a generated one: office:17, or office:seed for one a seed",
+        |case, value| {
+            case.draft = open(text(value)?, case.seed).map_err(|e| e.to_string())?;
+            Ok(())
+        },
+    ),
     // Before those that a method's name implies, so that what is said of them beside it holds.
     ("method", "anchored-ekf", "homing method, by its name in `wayhome compare`", |case, value| {
         set_method(&mut case.setup, text(value)?)
@@ -332,7 +355,7 @@ mod tests {
     use crate::sensor::Noise;
 
     fn case() -> Case {
-        Case { draft: Draft::open("crowd").unwrap(), setup: Setup::default() }
+        Case { draft: Draft::open("crowd").unwrap(), setup: Setup::default(), seed: 1 }
     }
 
     #[test]
@@ -393,7 +416,7 @@ mod tests {
                 (_, Ok(truth)) => Value::Truth(truth),
                 _ => Value::Text((*default).to_owned()),
             };
-            let mut case = Case { draft: Draft::open("crowd").unwrap(), setup: base.clone() };
+            let mut case = Case { draft: Draft::open("crowd").unwrap(), setup: base.clone(), seed: 1 };
             // Such as "the world's" are words for people, which no setting takes.
             if apply(&mut case, key, &value).is_ok() {
                 assert_eq!(case.setup, base, "{key} = {default}");

@@ -21,12 +21,13 @@ pub const MOST_EPISODES: u64 = 100_000_000;
 /// Most episodes in one chunk, the unit in which a study is run, stored and resumed.
 const CHUNK_EPISODES: u64 = 20;
 /// Studies that the program carries with it, as (name, TOML text).
-const BUILTIN: [(&str, &str); 5] = [
+const BUILTIN: [(&str, &str); 6] = [
     ("slip-occlusion", include_str!("../../../worlds/studies/slip-occlusion.toml")),
     ("wet-hall", include_str!("../../../worlds/studies/wet-hall.toml")),
     ("light-camera", include_str!("../../../worlds/studies/light-camera.toml")),
     ("faults-sobol", include_str!("../../../worlds/studies/faults-sobol.toml")),
     ("robustness", include_str!("../../../worlds/studies/robustness.toml")),
+    ("rooms", include_str!("../../../worlds/studies/rooms.toml")),
 ];
 
 /// A setting that a study varies.
@@ -320,16 +321,26 @@ impl Study {
         self.axes.iter().enumerate().map(turn).collect()
     }
 
-    /// World and setup of a cell.
+    /// Whether each seed has a world of its own: a `world` such as `office:seed`.
+    #[must_use]
+    pub fn draws_worlds(&self) -> bool {
+        let drawn = |value: &Value| matches!(value, Value::Text(text) if settings::is_drawn(text));
+        let set = self.settings.iter().any(|(name, value)| name == "world" && drawn(value));
+        let levels = |axis: &Axis| axis.setting == "world" && axis.levels.listed().iter().any(drawn);
+        set || settings::is_drawn(&self.world) || self.axes.iter().any(levels)
+    }
+
+    /// World and setup of a cell's episode with this seed. The seed makes no difference unless the study
+    /// [draws worlds](Self::draws_worlds).
     ///
     /// # Errors
     /// When its settings do not go together.
-    pub fn case(&self, values: &[Value]) -> Result<(World, Setup)> {
+    pub fn case(&self, values: &[Value], seed: u64) -> Result<(World, Setup)> {
         let mut settings: Vec<(&str, &Value)> = self.settings.iter().map(|(name, value)| (name.as_str(), value)).collect();
         settings.extend(self.axes.iter().zip(values).map(|(axis, value)| (axis.setting.as_str(), value)));
         settings.retain(|(_, value)| **value != Value::Unset);
         settings.sort_by_key(|(name, _)| settings::rank(name)); // stable: of two of one rank the later one holds
-        let mut case = Case { draft: Draft::open(&self.world)?, setup: self.base.clone() };
+        let mut case = Case { draft: settings::open(&self.world, seed)?, setup: self.base.clone(), seed };
         for (name, value) in settings {
             settings::apply(&mut case, name, value)?;
         }
@@ -343,7 +354,7 @@ impl Study {
             let others = (0..first.len()).filter(|k| Some(*k) != self.compared());
             others.for_each(|k| first[k] = Value::Unset);
         }
-        let try_out = |values: &[Value]| self.case(values).and_then(|(_, setup)| setup.check());
+        let try_out = |values: &[Value]| self.case(values, *self.seeds.start()).and_then(|(_, setup)| setup.check());
         if let Err(error) = try_out(&first) {
             let line = self.axes.iter().zip(0..).find_map(|(axis, k)| {
                 let named = matches!(&error, Error::Invalid { what, .. } if *what == axis.setting);

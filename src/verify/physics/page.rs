@@ -9,7 +9,7 @@ use crate::error::Result;
 use crate::storage::OutputFolder;
 use crate::verify::outside;
 
-/// Names of all files of the page. [`OUTSIDE`] comes from outside and is kept as it is.
+/// Names of all files of the page. `OUTSIDE` comes from outside and is kept as it is.
 pub const FILES: &[&str] = &[
     "README.md",
     "sideways-stop.svg",
