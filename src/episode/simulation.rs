@@ -581,7 +581,9 @@ impl Episode<'_> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::setup::{SensorKind, Start};
+    #[cfg(feature = "rapier")]
+    use super::super::setup::SensorKind;
+    use super::super::setup::Start;
     use super::*;
     use crate::observation::HomeSnapshot;
     use crate::physics::PlantStep;
@@ -706,6 +708,7 @@ mod tests {
     }
 
     /// Whoever steps by hand sees what a method would have seen, and gets the same record.
+    #[cfg(feature = "rapier")]
     #[test]
     fn a_run_can_be_stepped_by_hand() {
         let world = World::open("lab").unwrap();

@@ -174,7 +174,7 @@ fn picture(study: &Robustness) -> String {
     document([2.0 * WIDTH_PX + 3.0 * GAP_PX, bottom + GAP_PX]).add(all).to_string() + "\n"
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "rapier"))]
 mod tests {
     use super::*;
     use crate::episode::{SensorKind, Setup};

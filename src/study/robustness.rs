@@ -134,7 +134,7 @@ pub fn run(study: &Study, pool: &Pool<'_>, watch: &(dyn Fn(&Row) + Sync)) -> Res
     })
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "rapier"))]
 mod tests {
     use super::*;
     use crate::episode::SensorKind;

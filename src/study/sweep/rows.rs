@@ -161,7 +161,7 @@ pub fn without_result(episode: u64, (cell, seed): (u64, u64), values: &Arc<[Valu
     Row { episode, cell, values: Arc::clone(values), run: RunRow { seed, outcome, reason, ..RunRow::default() } }
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "rapier"))]
 mod tests {
     use super::*;
     use std::path::Path;
