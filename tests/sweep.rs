@@ -374,4 +374,8 @@ fn the_page_is_drawn_in_a_browser() {
         assert_eq!(page["figures"].as_array().unwrap().len(), 2 + 1 + 2 * 2, "at {width} px: {page}");
         assert_eq!(page["pictures"], 24, "at {width} px: path and panorama of twelve failures");
     }
+    done(wayhome(at, &["sweep", "report", "rows", "--no-gallery", "--out", "plain"]));
+    let plain = fs::read_to_string(at.join("plain/index.html")).unwrap();
+    assert_eq!((plain.matches("home --replay").count(), plain.matches("<img").count()), (0, 0));
+    assert_eq!(plain.matches("<svg").count(), 2 + 1 + 2 * 2, "the figures stay");
 }

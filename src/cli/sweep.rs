@@ -73,6 +73,9 @@ pub enum SweepCommand {
         /// Folder for the page, its figures and tables [default: DIR/report]
         #[arg(long, value_name = "DIR")]
         out: Option<PathBuf>,
+        /// Leave failed runs with their paths and panoramas out: a page of a quarter of the size, and nothing is run again
+        #[arg(long)]
+        no_gallery: bool,
     },
 }
 
@@ -120,7 +123,7 @@ struct Swept {
 pub fn run(args: &SweepArgs, context: &Context) -> Result<Verdict> {
     match (&args.command, &args.study) {
         (Some(SweepCommand::Merge { shards, out }), _) => merge(shards, out, context),
-        (Some(SweepCommand::Report { study, out }), _) => report(study, out.as_deref(), context),
+        (Some(SweepCommand::Report { study, out, no_gallery }), _) => report(study, out.as_deref(), !no_gallery, context),
         (None, Some(study)) => sweep(args, study, context),
         (None, None) => {
             let mut text = String::new();
@@ -217,12 +220,13 @@ fn merge(shards: &[PathBuf], out: &Path, context: &Context) -> Result<Verdict> {
     Ok(Verdict::Done)
 }
 
-fn report(study: &Path, out: Option<&Path>, context: &Context) -> Result<Verdict> {
+fn report(study: &Path, out: Option<&Path>, gallery: bool, context: &Context) -> Result<Verdict> {
     let folder = StudyFolder::open(study)?;
     let out = out.map_or_else(|| study.join("report"), Path::to_owned);
     let bar = context.progress(None)?;
     let rows = folder.rows()?;
-    let (shown, withheld) = exhibits(folder.study(), &rows, page::EXHIBITS, &mut || bar.at("running failures again"))?;
+    let (shown, withheld) =
+        exhibits(folder.study(), &rows, if gallery { page::EXHIBITS } else { 0 }, &mut || bar.at("running failures again"))?;
     drop(bar);
     page::write(&folder, &rows, (&shown, withheld), &out)?;
     let page = out.join("index.html").display().to_string();
