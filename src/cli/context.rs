@@ -66,7 +66,7 @@ impl Context {
     /// Sets up logging, worker threads and the handler of Ctrl-C for a command, which is kept as it was given.
     pub fn new(args: &CommonArgs, command: clap::Command, matches: ArgMatches) -> Result<Self> {
         let filter = env_logger::Env::default().default_filter_or(if args.quiet { "off" } else { "error,wayhome=warn" });
-        env_logger::Builder::from_env(filter).format_timestamp(None).init();
+        env_logger::Builder::from_env(filter).init();
         if let Some(threads) = args.threads {
             rayon::ThreadPoolBuilder::new()
                 .num_threads(usize::from(threads))
