@@ -122,7 +122,7 @@ fn every_layout_is_read_back_equal() {
         assert_eq!(entries, set.entries().len());
         assert_eq!(set.clone().only("original").unwrap().at(Place { i: 0, j: 9 }).map(|_| ()).map_err(|_| ()), Err(()));
         // A condition by itself is a set, too.
-        if matches!(layout, LayoutKind::Vardy | LayoutKind::Folder | LayoutKind::ImageDatabase) {
+        if !layout.layout().is_one_folder() {
             let alone = PanoramaSet::open(&folder.path().join("original")).unwrap();
             assert_eq!((alone.layout(), alone.load(0).unwrap().rgba), (layout, set.load(0).unwrap().rgba));
         }
@@ -619,6 +619,48 @@ fn python() -> Option<PathBuf> {
     None
 }
 
+/// What `checksum` of `tests/outside/dataset_readers.py` says of some values.
+fn checksum(values: impl Iterator<Item = u64>) -> u64 {
+    values.zip(1..).fold(0, |sum, (value, number)| (sum + value * number) % 1_000_000_007)
+}
+
+fn checksum_rgb(seen: &Panorama) -> u64 {
+    checksum(seen.rgba.chunks_exact(4).flat_map(|p| [p[0], p[1], p[2]]).map(u64::from))
+}
+
+/// What a script of `tests/outside/` prints of a folder.
+fn told_by(python: &Path, script: &str, folder: &Path) -> serde_json::Value {
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/outside").join(script);
+    let cache = tempfile::tempdir().unwrap();
+    let mut command = Command::new(python);
+    command.arg(script).arg(folder).env("HF_HOME", cache.path()).env("HF_HUB_OFFLINE", "1");
+    let output = command.output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+/// Hugging Face's `datasets` sees pictures and poses of an ImageFolder.
+#[test]
+fn datasets_loads_an_image_folder() {
+    let Some(python) = python() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let plan = Plan::new(&World::open("lab").unwrap(), request(LayoutKind::ImageFolder)).unwrap();
+    make(&plan, folder.path(), (1, 1)).unwrap();
+    let told = told_by(&python, "image_folder.py", &folder.path().join("original"));
+    let set = PanoramaSet::open(folder.path()).unwrap().only("original").unwrap();
+    let samples = told.as_array().unwrap();
+    assert_eq!(samples.len(), set.entries().len());
+    for (k, (sample, entry)) in samples.iter().zip(set.entries()).enumerate() {
+        let (pose, place) = (entry.pose.unwrap(), entry.place.unwrap());
+        let wanted = serde_json::json!({
+            "condition": "original", "row": place.i, "column": place.j, "t_s": null,
+            "x_m": pose.x, "y_m": pose.y, "heading_rad": pose.heading,
+            "size": [SIZE.0, SIZE.1], "rgb": checksum_rgb(&set.load(k).unwrap()),
+        });
+        assert_eq!(*sample, wanted);
+    }
+}
+
 /// PyPI's `webdataset` and `pyarrow` see what was written.
 #[test]
 fn outside_readers_agree() {
@@ -627,20 +669,16 @@ fn outside_readers_agree() {
     let folder = tempfile::tempdir().unwrap();
     let plan = Plan::new(&world, request(LayoutKind::Webdataset)).unwrap();
     make(&plan, folder.path(), (1, 1)).unwrap();
-    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/outside/dataset_readers.py");
-    let output = Command::new(python).arg(script).arg(folder.path()).output().unwrap();
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    let told: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    let told = told_by(&python, "dataset_readers.py", folder.path());
 
     let samples = told["samples"].as_object().unwrap();
     let set = PanoramaSet::open(folder.path()).unwrap();
     assert_eq!(samples.len(), set.entries().len());
     for (k, entry) in set.entries().iter().enumerate() {
         let (sample, seen) = (&samples[&entry.key], set.load(k).unwrap());
-        let sum = |values: &mut dyn Iterator<Item = u64>| values.zip(1..).fold(0_u64, |s, (v, n)| (s + v * n) % 1_000_000_007);
-        let rgb = sum(&mut seen.rgba.chunks_exact(4).flat_map(|p| [p[0], p[1], p[2]]).map(u64::from));
-        let range = sum(&mut seen.range_m.iter().map(|r| (f64::from(*r) * 1000.0).round() as u64));
-        let instance = sum(&mut seen.instance.iter().map(|i| u64::from(*i)));
+        let range = checksum(seen.range_m.iter().map(|r| (f64::from(*r) * 1000.0).round() as u64));
+        let instance = checksum(seen.instance.iter().map(|i| u64::from(*i)));
+        let rgb = checksum_rgb(&seen);
         assert_eq!(sample["size"], serde_json::json!([SIZE.0, SIZE.1]));
         assert_eq!((&sample["rgb"], &sample["range"], &sample["instance"]), (&rgb.into(), &range.into(), &instance.into()));
         assert!((sample["x_m"].as_f64().unwrap() - entry.pose.unwrap().x).abs() < 1e-12);
