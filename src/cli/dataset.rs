@@ -3,6 +3,7 @@
 use std::f64::consts::PI;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
 
 use anyhow::{Result, bail};
 use serde::Serialize;
@@ -17,6 +18,9 @@ use wayhome::report::dataset as report;
 use super::changes::ChangeArgs;
 use super::context::{Context, Verdict, folder_or};
 use super::values::{choice, choice_of, number, pair, point, positive, shard, size};
+
+/// Time between two lines of progress where no terminal shows a bar.
+const LINE_EVERY: Duration = Duration::from_secs(10);
 
 /// Shown under `dataset --help`.
 const HELP: &str = "A route is CSV with columns x_m, y_m and perhaps heading_deg or heading_rad. Poses at which the robot cannot stand are left out
@@ -35,7 +39,7 @@ pub struct DatasetArgs {
     pub world: Option<String>,
     #[command(flatten)]
     pub changes: ChangeArgs,
-    /// Places along x and y
+    /// Where: an even grid with so many places along x and y. One of --grid, --route, --random and --trajectory is needed
     #[arg(long, value_name = "NXxNY", value_parser = grid, requires = "spacing_m", required_unless_present_any = ["route", "random", "trajectory"])]
     pub grid: Option<(usize, usize)>,
     /// Distance between places of the grid, m
@@ -44,13 +48,13 @@ pub struct DatasetArgs {
     /// Place of the grid with the least x and y [default: home on a place, the grid about the middle of the room]
     #[arg(long, value_name = "X,Y", requires = "grid", allow_hyphen_values = true, value_parser = point)]
     pub origin: Option<[f64; 2]>,
-    /// The points of a table
+    /// Where: the points of a table, instead of --grid
     #[arg(long, value_name = "FILE.csv")]
     pub route: Option<PathBuf>,
-    /// So many random places
+    /// Where: so many random places, instead of --grid
     #[arg(long, value_name = "N")]
     pub random: Option<usize>,
-    /// The poses of a run: its folder or its trajectory.csv
+    /// Where: the poses of a run, its folder or its trajectory.csv, instead of --grid
     #[arg(long, value_name = "RUN")]
     pub trajectory: Option<PathBuf>,
     /// Headings at every place, degrees, separated by commas; `random`, or `random:N` for N of them [default: as the places say, else
@@ -166,16 +170,24 @@ fn make(args: &DatasetArgs, context: &Context) -> Result<Verdict> {
     let out = folder_or(args.out.as_deref(), &["dataset", &world.spec.name, &args.seed.to_string()]);
     let mut renderer = render::create(args.renderer)?;
     let bar = context.work(plan.frames() as u64)?;
-    let mut begun = false;
+    let mut begun = None;
+    let mut told = Instant::now();
     let shard = args.shard.map_or((1, 1), |[i, n]| (i as usize, n as usize));
     let job = Job { plan: &plan, out: &out, shard, extras: &report::card };
     let outcome = job.run(renderer.as_mut(), &mut |progress| {
-        if !begun {
+        let (start, found) = *begun.get_or_insert_with(|| {
             // What is there already says nothing about the rate.
             bar.set_length(progress.all as u64);
             bar.set_position(progress.done as u64);
             bar.reset_eta();
-            begun = true;
+            (Instant::now(), progress.done)
+        });
+        // Where no terminal shows the bar, a line tells now and then; `--quiet` turns warnings off, too.
+        if bar.is_hidden() && log::log_enabled!(log::Level::Warn) && told.elapsed() >= LINE_EVERY && progress.done > found {
+            told = Instant::now();
+            let per_s = (progress.done - found) as f64 / start.elapsed().as_secs_f64();
+            let left_s = (progress.all - progress.done) as f64 / per_s;
+            eprintln!("{} of {} panoramas, {per_s:.1} a second, {left_s:.0} s left", progress.done, progress.all);
         }
         bar.set_position(progress.done as u64);
         bar.flow()

@@ -14,8 +14,10 @@ use crate::world::spec::NoiseSpec;
 use crate::world::{CameraPreset, LightPreset, OpticsSpec, TextureSpec, World, WorldSpec};
 
 /// What the changes are called, for messages and `--help`.
-pub const CHANGES: &str = "original; light: day, overcast, glare, evening, night, winlit[:WINDOW]; camera: ideal, decent, cheap, dirty, \
-                           night-camera, exposure:FACTOR, blur:DEG, noise:ELECTRONS; room: moved[:N], textures[:N]";
+pub const CHANGES: &str = "original; light: day, overcast, glare, evening, night, winlit[:WINDOW] (that window alone, from 0); camera: \
+                           ideal, decent, cheap, dirty, night-camera, exposure:FACTOR (1 is as it is), blur:DEG (of the focus), \
+                           noise:ELECTRONS (that fill a pixel; fewer are noisier); room: moved[:N] (furniture, each N in another \
+                           order), textures[:N] (images swapped and patterns redrawn, each N in another way)";
 /// Furniture is moved by at most this far along x and y, m, ...
 const MOVED_M: f64 = 0.6;
 /// ... turned by at most this much, degrees, ...
