@@ -400,7 +400,9 @@ impl Frame {
             glow: 0.0,
             padding: [0; 2],
         });
-        self.looks.push(block.sides[0].look);
+        // A camera sees one of the long sides, and all of the block has one look.
+        let left = cross(block.along, origin) < 0.0;
+        self.looks.push(if left { block.left_look } else { block.sides[0].look });
     }
 
     /// Number of a surface's material.

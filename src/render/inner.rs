@@ -29,6 +29,8 @@ pub(super) struct Block {
     pub bottom_m: f64,
     /// Height of the top, m.
     pub top_m: f64,
+    /// What it looks like from the left of its wall; from the right it is as its first side.
+    pub left_look: u32,
     /// Where its wall begins, and which way it goes: the axes of the textures on top and underside.
     pub origin: Vector2<f64>,
     pub along: Vector2<f64>,
@@ -56,7 +58,8 @@ impl InnerWalls {
                     all.faces.extend(sides);
                 } else {
                     let (bottom_m, top_m) = (piece.bottom_m, piece.top_m.min(room_height_m));
-                    all.blocks.push(Block { sides, bottom_m, top_m, origin: wall.from, along: wall.along });
+                    let (left_look, origin, along) = (sides[2].look, wall.from, wall.along);
+                    all.blocks.push(Block { sides, bottom_m, top_m, left_look, origin, along });
                 }
             }
         }
@@ -69,7 +72,7 @@ fn sides(wall: &Partition, stretch: [f64; 2], material: usize) -> [Face; 4] {
     let [start, end] = stretch;
     let corners = wall.footprint(stretch);
     // Around the end of a piece the texture of the right side goes on.
-    let u = [start, end, wall.length_m - end, start - wall.thickness_m];
+    let u = [start, end, wall.left_start_m + wall.length_m - end, start - wall.thickness_m];
     std::array::from_fn(|k| Face {
         a: corners[k],
         b: corners[(k + 1) % 4],

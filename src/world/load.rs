@@ -11,7 +11,7 @@ use super::picture::{Gallery, Pictures};
 use super::polygon::{anticlockwise, signed_area};
 use super::repeats;
 use super::robot::{RobotPreset, RobotSpec};
-use super::spec::{BodySpec, CameraPreset, ShapeSpec, WallSpec, WindowSpec, WorldSpec};
+use super::spec::{BodySpec, CameraPreset, RoomSpec, ShapeSpec, WallSpec, WindowSpec, WorldSpec};
 use super::structure::{self, Findings};
 use super::texture::Texture;
 use super::validate;
@@ -209,11 +209,10 @@ impl World {
         let partitions = spec.walls.iter().enumerate();
         let partitions = partitions.map(|(k, w)| {
             // Far from all others' seeds, for the same reason.
+            let seed = seed(u64::MAX / 4 + k as u64);
             let texture = w.texture.as_ref().unwrap_or(&walls[0]);
-            // Faces across openings take up as much of the texture as the wall is thick.
-            let length_m = w.length_m() + 2.0 * w.thickness_m;
-            let texture = Texture::new(texture, length_m, seed(u64::MAX / 4 + k as u64), pictures);
-            partition(w, k, spec.room.height_m, texture, first_partition.wrapping_add(k as u16))
+            let texture = |length_m: f64| Texture::new(texture, length_m, seed, pictures);
+            partition(w, k, &spec.room, texture, first_partition.wrapping_add(k as u16))
         });
         let partitions = partitions.collect();
         let zones =
@@ -285,18 +284,29 @@ fn footprint(body: &BodySpec) -> Footprint {
     }
 }
 
-/// The checked form of wall `k` inside a room of this height.
-fn partition(wall: &WallSpec, k: usize, room_height_m: f64, texture: Texture, instance: u16) -> Partition {
+/// The checked form of wall `k` inside a room. `texture` makes one that covers so much along u, m.
+fn partition(wall: &WallSpec, k: usize, room: &RoomSpec, texture: impl Fn(f64) -> Texture, instance: u16) -> Partition {
     let [from, to] = [wall.from_m, wall.to_m].map(|[x, y]| Vector2::new(x, y));
-    let length_m = wall.length_m();
+    let (length_m, thickness_m) = (wall.length_m(), wall.thickness_m);
+    let height_m = wall.height_m.unwrap_or(room.height_m);
+    let spec = wall.texture.as_ref().unwrap_or(&room.walls[0]);
+    let asks_for_less = spec.period_m.is_some() || spec.image.is_some();
+    // The sides of a wall as high as the room share the width of its texture, since no end of a piece above or below an opening is
+    // seen with either of them. Around a lower wall the texture goes on.
+    let (texture, left_start_m, rises) = if height_m < room.height_m {
+        (texture(2.0 * (length_m + thickness_m)), length_m + thickness_m, false)
+    } else {
+        (texture(length_m + 2.0 * thickness_m), 0.0, true)
+    };
     Partition {
         name: if wall.name.is_empty() { format!("inner wall {k}") } else { wall.name.clone() },
         from,
         along: (to - from) / length_m.max(1e-9),
         length_m,
-        thickness_m: wall.thickness_m,
-        pieces: pieces(wall, wall.height_m.unwrap_or(room_height_m)),
-        left_rise_m: if texture.fitted { 0.5 * texture.period_m[1] } else { 0.0 },
+        thickness_m,
+        pieces: pieces(wall, height_m),
+        left_start_m: if asks_for_less { 0.0 } else { left_start_m },
+        left_rise_m: if rises && !asks_for_less { 0.5 * texture.period_m[1] } else { 0.0 },
         texture,
         instance,
     }

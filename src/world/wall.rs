@@ -128,7 +128,10 @@ pub struct Partition {
     /// Texture. u runs along the right side from the beginning of the wall, along the left side from its end, so that whoever stands
     /// before either side sees it run from left to right; v is the height above the floor.
     pub texture: Texture,
-    /// How much farther up in its texture the left side is, m, so that the two sides do not look alike.
+    /// Where in its texture the left side begins along u, and how much farther up along v, m, so that the two sides do not look
+    /// alike.
+    pub left_start_m: f64,
+    /// See above.
     pub left_rise_m: f64,
     /// Instance id in panoramas.
     pub instance: u16,
