@@ -99,9 +99,7 @@ pub fn run(args: &GenerateArgs, context: &Context) -> Result<Verdict> {
         let batch: Vec<_> =
             (from..=to).into_par_iter().map(|seed| generate(args.kind, seed, &knobs)).collect::<wayhome::Result<_>>()?;
         for world in batch {
-            if bar.flow().is_break() {
-                return Err(Error::Interrupted.into());
-            }
+            bar.go_on()?;
             if let Some(folder) = &mut open {
                 folder.write(&format!("{}.toml", world.spec.name), world.toml.as_bytes())?;
             }
@@ -119,7 +117,7 @@ pub fn run(args: &GenerateArgs, context: &Context) -> Result<Verdict> {
         }
         from = to + 1;
     }
-    bar.finish_and_clear();
+    drop(bar);
     if let Some(folder) = open {
         folder.finish()?;
     }
