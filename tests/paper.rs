@@ -2,18 +2,23 @@
 
 #![allow(clippy::print_stdout, clippy::unwrap_used, reason = "a failing test shows its table, and fails by panicking")]
 
+use std::ops::ControlFlow;
+
 use num_dual::{Dual64, DualNum};
 use wayhome::control::Law;
 use wayhome::control::vectors::VectorLaw;
+use wayhome::episode::{PlantKind, SensorKind, Setup, Simulation, Start};
 use wayhome::estimation::observability::rate_gradient;
-use wayhome::estimation::paper::{PaperSettings, Transition};
 use wayhome::geometry::Pose;
+use wayhome::method::MethodKind;
 use wayhome::panorama::Panorama;
 use wayhome::render::{CpuRenderer, Renderer, Scene, View};
-use wayhome::study::paper::claims::{StartError, claims, image_claims};
-use wayhome::study::paper::contest::{Entrant, Source, Told, contest};
-use wayhome::study::paper::ideal::{Ideal, Twists};
+use wayhome::study::paper::claims::{claims, image_claims};
+use wayhome::study::paper::contest::{Source, Told, contest};
+use wayhome::study::paper::course::{Course, StartError, Variant};
+use wayhome::study::paper::ideal::Ideal;
 use wayhome::study::paper::images::{ImageCase, ImageSet};
+use wayhome::study::paper::trial::Sample;
 use wayhome::study::paper::{LAWS, STARTS, TABLE_I};
 use wayhome::world::World;
 
@@ -24,14 +29,40 @@ fn ideal() -> Ideal {
 /// Every cell of R and theta at or below the printed one, from the true start; alpha at rounding.
 #[test]
 fn table_one_is_met() {
-    let runs = ideal().table_one().unwrap();
+    let runs = ideal().runs(&Variant::default()).unwrap();
     assert_eq!(runs.len(), 8);
     for run in &runs {
         let row = STARTS.iter().position(|s| *s == run.start).unwrap();
-        let printed = TABLE_I.rows[row][usize::from(run.law == Law::Lyapunov)];
+        let printed = TABLE_I[row][usize::from(run.law == Law::Lyapunov)];
         let ours = run.track.rmse().unwrap();
         println!("{} {:?} {ours:?} printed {printed:?} home {:?}", run.start, run.law, run.track.time_s());
         assert!(run.track.home && ours[0] <= printed[0] && ours[1] <= printed[1] && ours[2] < 1e-11);
+    }
+}
+
+/// A run of Table I is the one of `wayhome home paper-ideal --plant unicycle --bearings ideal --method paper-ekf` that is told the true
+/// start: the same commands at the same poses until it stops.
+#[test]
+fn table_one_is_what_home_does() {
+    let world = World::open("paper-ideal").unwrap();
+    for run in ideal().runs(&Variant::default()).unwrap().iter().filter(|run| run.start == "P1") {
+        let (plant, sensor, method) = (PlantKind::Unicycle, SensorKind::Ideal, MethodKind::PaperEkf);
+        let start = Start::Named(run.start.into());
+        let setup = Setup { plant, sensor, method, law: run.law, start, told_start: true, ..Setup::default() };
+        let record = Simulation::new(&world, &setup).unwrap().run(0, &mut |_| ControlFlow::Continue(())).unwrap();
+        let steps: Vec<_> = record.steps.iter().filter(|step| step.seen.is_some()).collect();
+        assert_eq!(steps.len(), run.track.samples.len());
+        for (step, sample) in steps.iter().zip(&run.track.samples) {
+            let (truth, estimate) = (world.home.to_local(&step.truth), step.estimate.unwrap().pose);
+            for (a, b) in [(truth, sample.truth), (estimate, sample.estimate.unwrap().pose)] {
+                let off = [a.x - b.x, a.y - b.y, wayhome::geometry::wrap(a.heading - b.heading)];
+                assert!(step.time_s == sample.time_s && off.iter().all(|d| d.abs() < 1e-9), "{} s: {off:?}", step.time_s);
+            }
+            let off = [step.command.v - sample.command.v, step.command.omega - sample.command.omega];
+            // The last command of `home` is the stop.
+            let last = step.time_s == record.time_s;
+            assert!(last || off.iter().all(|d| d.abs() < 1e-9), "{} s: {off:?}", step.time_s);
+        }
     }
 }
 
@@ -39,23 +70,21 @@ fn table_one_is_met() {
 #[test]
 fn the_filter_needs_the_true_start_and_the_printed_jacobian_freezes_alpha() {
     let claims = claims(&ideal()).unwrap();
-    let of = |list: &[(StartError, [wayhome::study::paper::claims::Tally; 2])], wanted: StartError| {
-        list.iter().find(|(error, _)| *error == wanted).unwrap().1
-    };
-    assert!(of(&claims.starts, StartError::None).iter().all(|t| t.home == 4));
-    assert!(of(&claims.starts, StartError::Untold).iter().all(|t| t.home <= 1));
+    let [truth, untold, ten] =
+        [StartError::None, StartError::Untold, StartError::TEN_DEGREES].map(|start| claims.started(start).unwrap());
+    assert!(truth[0].iter().all(|t| t.home == 4));
+    assert!(untold[0].iter().all(|t| t.home <= 1));
     assert!(claims.anchored.iter().all(|t| t.home >= 3), "{:?}", claims.anchored);
-    let ten = StartError::Heading(10.0_f64.to_radians());
-    let frozen = of(&claims.starts_printed, ten)[0].heading_rmse_rad;
-    assert!((frozen - 10.0_f64.to_radians()).abs() < 1e-9, "{frozen}");
-    assert!(of(&claims.starts, ten)[0].heading_rmse_rad < 0.1);
+    assert!(claims.frozen > 0 && ten[0][0].heading_rmse_rad < 0.1);
+    // Alpha can change only where the covariance has grown past all bounds and the filter starts over, which takes longer than a second.
+    for run in ideal().runs(&Variant::default().printed().started(StartError::TEN_DEGREES)).unwrap() {
+        let off = |s: &Sample| wayhome::geometry::wrap(s.estimate.unwrap().pose.heading - s.truth.heading);
+        let stays = |s: &Sample| (off(s) - 10.0_f64.to_radians()).abs() < 1e-9;
+        assert!(run.track.samples[..10].iter().all(stays), "{} {:?}", run.start, run.law);
+    }
     // So far as alpha goes the printed figures are met by the printed Jacobian whatever the bearings.
-    let twists = Twists {
-        settings: PaperSettings { transition: Transition::Printed, ..PaperSettings::default() },
-        noise: Some((0.01, 1)),
-        ..Twists::default()
-    };
-    assert!(ideal().runs(&twists, |start| *start).unwrap().iter().all(|run| run.track.rmse().unwrap()[2] < 1e-13));
+    let noisy = Ideal { noise: Some((0.01, 1)), ..ideal() };
+    assert!(noisy.runs(&Variant::default().printed()).unwrap().iter().all(|run| run.track.rmse().unwrap()[2] < 1e-13));
 }
 
 /// J, K, P and Q against automatic differentiation of (4) with (3), as printed.
@@ -87,21 +116,22 @@ fn the_comparison_has_the_order_that_the_page_states() {
     let case = ImageCase::new(ImageSet::Vardy, None).unwrap();
     for (source, slack) in [(Source::Images, 0.0), (Source::Points, 5e-4)] {
         let contest = contest(&case, source).unwrap();
-        let ratio = |entrant| contest.row(entrant).unwrap().mean_ratio(&contest.straight_s);
+        let ratio = |method: MethodKind, law, told| contest.row(&method, law, told).unwrap().mean_ratio;
         for law in LAWS {
-            let paper = ratio(Entrant::Paper(law)).unwrap();
+            let paper = ratio(MethodKind::PaperEkf, law, Told::Start).unwrap();
             for vector in VectorLaw::ALL {
                 for told in [Told::Compass, Told::Nothing] {
-                    let other = ratio(Entrant::Vector(vector, law, told)).unwrap();
+                    let other = ratio(vector.into(), law, told).unwrap();
                     println!("{source:?} {law:?} paper {paper:.3} {vector:?} {told:?} {other:.3}");
                     assert!(paper <= other + slack && other < 1.2, "told the start it is first in the mean at equal laws");
                 }
             }
-            assert_eq!(ratio(Entrant::PaperUntold(law)), None, "told nothing it does not come home");
+            assert_eq!(ratio(MethodKind::PaperEkf, law, Told::Nothing), None, "told nothing it does not come home from all");
         }
         // Across laws it is not: one vector law with a compass and the nonlinear law beats its proportional one.
-        let across = ratio(Entrant::Vector(VectorLaw::Ibvs, Law::Lyapunov, Told::Compass)).unwrap();
-        assert!(across < ratio(Entrant::Paper(Law::Proportional)).unwrap(), "the law matters more than the method");
+        let across = ratio(MethodKind::Ibvs, Law::Lyapunov, Told::Compass).unwrap();
+        let paper = ratio(MethodKind::PaperEkf, Law::Proportional, Told::Start).unwrap();
+        assert!(across < paper, "the law matters more than the method");
     }
     // Exact odometry from the true start needs no bearings.
     let claims = image_claims(&case).unwrap();
@@ -149,9 +179,7 @@ fn a_set_on_disk_drops_in() {
     misses.sort_by(f64::total_cmp);
     println!("{} bearings in common, median difference {:.3} deg", misses.len(), misses[misses.len() / 2].to_degrees());
     assert!(misses.len() > 300 && misses[misses.len() / 2] < 0.3_f64.to_radians());
-    assert!(
-        disk.runs(wayhome::study::paper::images::image_settings(), |start| *start).unwrap().iter().all(|run| run.track.home)
-    );
+    assert!(disk.runs(&Variant::of_images()).unwrap().iter().all(|run| run.track.home));
     // A set of another grid is refused by what it has.
     std::fs::remove_file(folder.path().join("9_16.pgm")).unwrap();
     assert!(ImageCase::new(ImageSet::Vardy, Some(folder.path())).unwrap_err().to_string().contains("(9, 16)"));

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::paper::ideal::Run;
+use super::statistics::mean;
 use crate::error::{Error, Result};
 use crate::estimation::observability::{Observability, observability};
 use crate::geometry::{Pose, Vector2, angle_of, direction};
@@ -70,8 +70,7 @@ impl ObservabilityMap {
     /// Share of the places whose condition is above [`DEGENERATE`].
     #[must_use]
     pub fn degenerate_share(&self) -> f64 {
-        let bad = self.places.iter().filter(|p| p.condition > DEGENERATE || p.condition.is_nan()).count();
-        bad as f64 / self.places.len().max(1) as f64
+        degenerate_share(self.places.iter().map(|p| p.condition))
     }
 
     /// A quantile of the condition over the places.
@@ -79,6 +78,11 @@ impl ObservabilityMap {
     pub fn condition_quantile(&self, share: f64) -> f64 {
         ranked(self.places.iter().map(|p| p.condition), share)
     }
+}
+
+/// Share of conditions above [`DEGENERATE`]; 0 of none.
+fn degenerate_share(conditions: impl Iterator<Item = f64>) -> f64 {
+    mean(conditions.map(|c| if c > DEGENERATE || c.is_nan() { 1.0 } else { 0.0 })).unwrap_or(0.0)
 }
 
 /// A quantile that is one of the values, because between infinite ones nothing can be interpolated. NaN of none.
@@ -116,7 +120,7 @@ pub fn map(world: &World, facing: Facing, spacing_m: f64) -> Result<Observabilit
             needed: "at least 3".into(),
         });
     }
-    let length_m = seen_at_home.iter().map(|(_, l)| l.norm()).sum::<f64>() / seen_at_home.len() as f64;
+    let length_m = mean(seen_at_home.iter().map(|(_, l)| l.norm())).unwrap_or_default();
     // Middles of cells that fill the room evenly.
     let centre = 0.5 * (low + high);
     let middle = |k: usize, count: f64, centre: f64| centre + (k as f64 - 0.5 * (count - 1.0)) * spacing_m;
@@ -158,50 +162,29 @@ pub fn map(world: &World, facing: Facing, spacing_m: f64) -> Result<Observabilit
     })
 }
 
-/// A case with an exact answer.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Case {
-    /// What is special about it.
-    pub name: &'static str,
-    /// What came out.
-    pub found: Observability,
-}
-
-/// The degenerate cases one by one, at P2 of the paper's ideal setting but for what each says.
+/// The degenerate cases one by one, each with what is special about it: at P2 of the paper's ideal setting but for what it says.
 #[must_use]
-pub fn cases(landmarks: &[Vector2<f64>; 3], usual: Pose) -> Vec<Case> {
-    let length_m = landmarks.iter().map(|l| l.norm()).sum::<f64>() / 3.0;
-    let at = |pose: Pose, landmarks: &[Vector2<f64>], moving| observability(&pose, landmarks, moving, length_m);
+pub fn cases(landmarks: &[Vector2<f64>; 3], usual: Pose) -> [(&'static str, Observability); 10] {
+    let length_m = mean(landmarks.iter().map(|l| l.norm())).unwrap_or_default();
+    let among = |landmarks: &[Vector2<f64>], pose: Pose| observability(&pose, landmarks, true, length_m);
+    let at = |pose: Pose| among(landmarks, pose);
     let p = usual.position();
-    let facing = |target: Vector2<f64>| Pose::new(p.x, p.y, angle_of(target - p));
-    let towards = facing(landmarks[1]);
-    let behind = -landmarks[0] * 0.5;
-    let far: Vec<Vector2<f64>> = landmarks.iter().map(|l| l * 100.0).collect();
+    let facing = |heading: f64| Pose::new(p.x, p.y, heading);
+    let towards = angle_of(landmarks[1] - p);
+    let standing = |p: Vector2<f64>| Pose::new(p.x, p.y, usual.heading);
     // Two landmarks in line with the robot: the second is put behind the first.
     let aligned = [landmarks[0], p + (landmarks[0] - p) * 1.7, landmarks[2]];
-    vec![
-        Case { name: "as it is at P2", found: at(usual, landmarks, true) },
-        Case { name: "at rest, turning or not (v = 0)", found: at(usual, landmarks, false) },
-        Case { name: "driving towards landmark 2", found: at(towards, landmarks, true) },
-        Case {
-            name: "driving away from landmark 2",
-            found: at(Pose::new(p.x, p.y, towards.heading + std::f64::consts::PI), landmarks, true),
-        },
-        Case {
-            name: "0.1 degrees off landmark 2",
-            found: at(Pose::new(p.x, p.y, towards.heading + 0.1_f64.to_radians()), landmarks, true),
-        },
-        Case {
-            name: "on the line through home and landmark 1, behind home",
-            found: at(Pose::new(behind.x, behind.y, usual.heading), landmarks, true),
-        },
-        Case { name: "at home", found: at(Pose::new(0.0, 0.0, usual.heading), landmarks, true) },
-        Case {
-            name: "1 cm from home",
-            found: at(Pose::new(p.x / p.norm() * 0.01, p.y / p.norm() * 0.01, usual.heading), landmarks, true),
-        },
-        Case { name: "two landmarks in line with the robot", found: at(usual, &aligned, true) },
-        Case { name: "landmarks 100 times as far away", found: at(usual, &far, true) },
+    [
+        ("as it is at P2", at(usual)),
+        ("at rest, turning or not (v = 0)", observability(&usual, landmarks, false, length_m)),
+        ("driving towards landmark 2", at(facing(towards))),
+        ("driving away from landmark 2", at(facing(towards + std::f64::consts::PI))),
+        ("0.1 degrees off landmark 2", at(facing(towards + 0.1_f64.to_radians()))),
+        ("on the line through home and landmark 1, behind home", at(standing(-landmarks[0] * 0.5))),
+        ("at home", at(standing(Vector2::zeros()))),
+        ("1 cm from home", at(standing(p / p.norm() * 0.01))),
+        ("two landmarks in line with the robot", among(&aligned, usual)),
+        ("landmarks 100 times as far away", among(&landmarks.map(|l| l * 100.0), usual)),
     ]
 }
 
@@ -227,47 +210,30 @@ const POSES: u64 = 400;
 #[must_use]
 pub fn geometries() -> Vec<Geometry> {
     use rand::RngExt;
+    use std::f64::consts::TAU;
     let mut stream = Seed(0).stream("observability poses");
-    let poses: Vec<Pose> = (0..POSES)
-        .map(|_| {
-            let [r, theta, alpha] = std::array::from_fn(|_| stream.random::<f64>());
-            let at = direction(std::f64::consts::TAU * theta) * (0.3 + 0.9 * r);
-            Pose::new(at.x, at.y, std::f64::consts::TAU * alpha)
-        })
-        .collect();
-    let tau = std::f64::consts::TAU;
-    let sets = [
-        (3, tau, 1.5),
-        (3, tau, 3.0),
-        (3, tau, 6.0),
-        (3, tau, 20.0),
-        (3, tau / 4.0, 3.0),
-        (3, tau / 24.0, 3.0),
-        (8, tau, 3.0),
-        (20, tau, 3.0),
-    ];
-    sets.into_iter()
-        .map(|(count, arc_rad, range_m)| {
-            // A full turn has no two ends: there the last one does not fall on the first.
-            let step = if arc_rad < tau { arc_rad / (count as f64 - 1.0) } else { arc_rad / count as f64 };
-            let landmarks: Vec<Vector2<f64>> = (0..count).map(|k| direction(0.2 + k as f64 * step) * range_m).collect();
-            let conditions: Vec<f64> = poses.iter().map(|pose| observability(pose, &landmarks, true, 1.0).condition).collect();
-            Geometry {
-                count,
-                arc_rad,
-                range_m,
-                median: ranked(conditions.iter().copied(), 0.5),
-                degenerate_share: conditions.iter().filter(|c| **c > DEGENERATE).count() as f64 / conditions.len() as f64,
-            }
-        })
-        .collect()
-}
-
-/// Condition over time (s) along the path of a run.
-#[must_use]
-pub fn along(run: &Run, landmarks: &[Vector2<f64>]) -> Vec<[f64; 2]> {
-    let length_m = landmarks.iter().map(|l| l.norm()).sum::<f64>() / landmarks.len().max(1) as f64;
-    run.track.samples.iter().map(|s| [s.time_s, observability(&s.truth, landmarks, true, length_m).condition]).collect()
+    let mut pose = |_| {
+        let [r, theta, alpha] = std::array::from_fn(|_| stream.random::<f64>());
+        let at = direction(TAU * theta) * (0.3 + 0.9 * r);
+        Pose::new(at.x, at.y, TAU * alpha)
+    };
+    let poses: Vec<Pose> = (0..POSES).map(&mut pose).collect();
+    let judge = |(count, arc_rad, range_m): (usize, f64, f64)| {
+        // A full turn has no two ends: there the last one does not fall on the first.
+        let step = if arc_rad < TAU { arc_rad / (count as f64 - 1.0) } else { arc_rad / count as f64 };
+        let landmarks: Vec<Vector2<f64>> = (0..count).map(|k| direction(0.2 + k as f64 * step) * range_m).collect();
+        let conditions = || poses.iter().map(|pose| observability(pose, &landmarks, true, 1.0).condition);
+        Geometry {
+            count,
+            arc_rad,
+            range_m,
+            median: ranked(conditions(), 0.5),
+            degenerate_share: degenerate_share(conditions()),
+        }
+    };
+    let full = [(3, TAU, 1.5), (3, TAU, 3.0), (3, TAU, 6.0), (3, TAU, 20.0)];
+    let others = [(3, TAU / 4.0, 3.0), (3, TAU / 24.0, 3.0), (8, TAU, 3.0), (20, TAU, 3.0)];
+    full.into_iter().chain(others).map(judge).collect()
 }
 
 #[cfg(test)]

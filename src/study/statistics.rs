@@ -134,6 +134,13 @@ pub fn cluster_bootstrap_95(clusters: &[(f64, usize)]) -> Option<(f64, [f64; 2])
     Some((all, [quantile(&draws, 0.025)?, quantile(&draws, 0.975)?]))
 }
 
+/// Mean of the values; `None` of none.
+#[must_use]
+pub fn mean(values: impl IntoIterator<Item = f64>) -> Option<f64> {
+    let (sum, count) = values.into_iter().fold((0.0, 0_usize), |(sum, count), value| (sum + value, count + 1));
+    (count > 0).then(|| sum / count as f64)
+}
+
 /// Quantile of the values at `share` in [0, 1], linear between neighbours; `None` of no values. NaN sorts last.
 #[must_use]
 pub fn quantile(values: &[f64], share: f64) -> Option<f64> {

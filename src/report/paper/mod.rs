@@ -1,7 +1,8 @@
 //! The page on the paper: its tables and figures rebuilt beside the printed numbers, and the audit of its claims.
 //!
 //! Each [`Target`] is a [`Section`] of one page with drawings of its own. A section that is rebuilt alone takes its place in the page
-//! that is there; the others stay.
+//! that is there; the others stay. The prose of a section stands in a Markdown file beside its code, with the names of what is measured
+//! in braces.
 
 mod audit;
 mod contest;
@@ -10,16 +11,15 @@ mod tables;
 
 use std::fs;
 use std::io;
+use std::sync::LazyLock;
 
 use strum::{EnumMessage, IntoStaticStr, VariantArray};
 
 use crate::error::{Error, Result};
 use crate::storage::OutputFolder;
+use crate::study::paper::evidence::Evidence;
 
-pub use audit::{Evidence, audit};
-pub use contest::contest;
-pub use observability::{map_csv, map_svg, observability, summary as map_summary};
-pub use tables::{fig_five, fig_seven, fig_three, table_one, table_two};
+pub use observability::{map_csv, map_svg, summary as map_summary};
 
 /// What can be reproduced, in the order of the page.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, EnumMessage, IntoStaticStr, VariantArray)]
@@ -50,26 +50,21 @@ impl Target {
     pub fn name(self) -> &'static str {
         self.into()
     }
-}
 
-/// Names of all files of the page.
-pub const FILES: &[&str] = &[
-    "README.md",
-    "fig3-proportional.svg",
-    "fig3-nonlinear.svg",
-    "fig4-objects.png",
-    "fig5-proportional.svg",
-    "fig5-nonlinear.svg",
-    "fig6-objects.png",
-    "fig7-proportional.svg",
-    "fig7-nonlinear.svg",
-    "fig8a.svg",
-    "fig8b.svg",
-    "observability-homeward.svg",
-    "observability-east.svg",
-    "observability-paths.svg",
-    "beta.svg",
-];
+    /// Names of its drawings.
+    fn figures(self) -> &'static [&'static str] {
+        match self {
+            Self::Table1 => &[],
+            Self::Fig3 => &["fig3-proportional.svg", "fig3-nonlinear.svg"],
+            Self::Table2 => &["fig4-objects.png"],
+            Self::Fig5 => &["fig5-proportional.svg", "fig5-nonlinear.svg"],
+            Self::Fig7 => &["fig7-proportional.svg", "fig7-nonlinear.svg", "fig6-objects.png"],
+            Self::Fig8 => &["fig8a.svg", "fig8b.svg"],
+            Self::Observability => &["observability-homeward.svg", "observability-east.svg", "observability-paths.svg"],
+            Self::Audit => &["beta.svg"],
+        }
+    }
+}
 
 /// One part of the page.
 #[derive(Debug, Clone, PartialEq)]
@@ -82,17 +77,39 @@ pub struct Section {
     pub figures: Vec<(&'static str, Vec<u8>)>,
 }
 
-const TITLE: &str = "# The paper, reproduced and audited
+impl Section {
+    /// With drawings in the order of [`Target::figures`].
+    fn new(target: Target, markdown: impl Into<String>, drawings: impl IntoIterator<Item = Vec<u8>>) -> Self {
+        let figures = target.figures().iter().copied().zip(drawings).collect();
+        Self { target, markdown: markdown.into(), figures }
+    }
+}
 
-\"Bearing only visual homing: Observer based approach\": its tables and figures rebuilt by this program beside the printed numbers, and \
-what of its claims holds, under which start and which noise. Everything here is written by
+/// One section, from evidence.
+///
+/// # Errors
+/// When the evidence for it cannot be had, or a picture cannot be encoded.
+pub fn section(target: Target, evidence: &Evidence) -> Result<Section> {
+    match target {
+        Target::Table1 => tables::table_one(evidence),
+        Target::Fig3 => tables::fig_three(evidence),
+        Target::Table2 => tables::table_two(evidence),
+        Target::Fig5 => tables::fig_five(evidence),
+        Target::Fig7 => tables::fig_seven(evidence),
+        Target::Fig8 => contest::fig_eight(evidence),
+        Target::Observability => observability::observability(evidence),
+        Target::Audit => audit::audit(evidence),
+    }
+}
 
-```sh
-wayhome reproduce all
-```
-
-and one part of it by `wayhome reproduce NAME`. Two runs give the same bytes. Nothing is tuned to print the paper's numbers.
-";
+/// Names of all files of the page.
+pub fn files() -> &'static [&'static str] {
+    static FILES: LazyLock<Vec<&'static str>> = LazyLock::new(|| {
+        let figures = Target::VARIANTS.iter().flat_map(|target| target.figures()).copied();
+        figures.chain(["README.md"]).collect()
+    });
+    &FILES
+}
 
 /// Writes sections with their drawings; those of the page that are not among them stay as they are, unless all are given.
 ///
@@ -114,7 +131,7 @@ pub fn write(mut folder: OutputFolder, sections: &[Section]) -> Result<()> {
 
 /// The page with its sections in order: new ones as given, others as in the page `before`.
 fn page(before: &str, sections: &[Section]) -> String {
-    let mut text = TITLE.to_owned();
+    let mut text = include_str!("title.md").to_owned();
     for target in Target::VARIANTS {
         let [begin, end] = ["begin", "end"].map(|edge| format!("<!-- {edge} {} -->\n", target.name()));
         let body = match sections.iter().find(|s| s.target == *target) {

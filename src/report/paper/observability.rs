@@ -1,59 +1,57 @@
 //! The observability section, and the table and drawing for any world.
 
-use std::fmt::Write;
-
 use super::{Section, Target, short};
 use crate::control::Law;
 use crate::draw::chart::{Axis, Chart, Ramp, Stroke};
 use crate::draw::map::MapDrawing;
+use crate::draw::markdown::table_of_numbers;
 use crate::error::Result;
+use crate::estimation::observability::Observability;
 use crate::geometry::Vector2;
-use crate::study::observability::{Case, DEGENERATE, Geometry, ObservabilityMap, along, cases, geometries, ranked};
-use crate::study::paper::ideal::{Ideal, Run};
+use crate::study::observability::{DEGENERATE, Geometry, ObservabilityMap, cases, geometries, ranked};
+use crate::study::paper::course::Run;
+use crate::study::paper::evidence::Evidence;
+use crate::study::paper::ideal::Ideal;
+use crate::study::paper::{STARTS, law_name};
 use crate::world::World;
 
 /// Colours of conditions: the logarithm to base ten from 0 to this.
 const MOST_LOG: f64 = 4.0;
 
 /// The section: maps of `paper-ideal` (towards home, and facing along x), cases, geometries, and the condition along the paths.
-///
-/// # Errors
-/// When the world cannot be opened.
-pub fn observability(ideal: &Ideal, runs: &[Run], homeward: &ObservabilityMap, east: &ObservabilityMap) -> Result<Section> {
-    let world = World::open("paper-ideal")?;
+pub(super) fn observability(evidence: &Evidence) -> Result<Section> {
+    let (ideal, homeward, east) = (&evidence.ideal, evidence.homeward()?, evidence.east()?);
     let landmarks: [Vector2<f64>; 3] = std::array::from_fn(|k| ideal.landmarks.get(k).copied().unwrap_or_default());
     let start = ideal.starts.get(1).map(|s| s.1).unwrap_or_default();
-    let mut text = format!(
-        "## Observability: the rank and condition of O\n\n`wayhome reproduce observability`; for any world `wayhome observability \
-         WORLD`. O of (14) stacks the gradients of the bearings and of their rates at unit speed, so its rank is the number of \
-         landmarks plus the rank of the block [J K P]. The printed J, K, P and Q are damaged; here they are derived anew, and a test \
-         holds them against automatic differentiation of (4) with (3). The condition is that of [J K P] with R in units of the \
-         landmarks' mean distance ({length:.2} m); above {limit:.0} it is degenerate in practice.\n\n{cases}\n\
-         So rank six holds for a robot that moves, away from home, with no landmark straight ahead or behind, off the lines through home \
-         and a landmark. Nothing in omega changes it: the gradients of the Lie derivatives along g2 are zero everywhere. Two bearing \
-         sets without motion leave R, theta and alpha open. Close to home it is the bearing theta of a vanishing R that cannot be told; in \
-         the plane the place can. On the lines through home and a landmark (3) divides by zero: parallax from home says nothing of \
-         that landmark's range. This is O as the paper cuts it off, after first derivatives; what a whole path \
-         tells, turns included, is what `wayhome bound` computes.\n\n![Condition, driving towards home](observability-homeward.svg)\n\n\
-         Driving towards home, {share:.1} % of the room is degenerate in practice, median condition {median:.0}: at home and at the \
-         landmarks. The lines through home and a landmark do not show: along them the rate of its bearing vanishes as fast as the \
-         divisor. To any other heading they are walls, as the next map shows.\n\n![Condition, facing along x](observability-east.svg)\n\nFacing along x everywhere, {east_share:.1} % is degenerate: the lines \
-         through home and a landmark, and a level one through each landmark, where it lies straight ahead or behind.\n\n![Condition along the paths](observability-paths.svg)\n\n{geometries}",
+    let case = |(name, found): (&str, Observability)| {
+        let rank = format!("{} of {}", found.rank, found.landmarks + 3);
+        [name.to_owned(), rank, short(found.condition), short(found.condition_in_plane)]
+    };
+    let geometry = |g: Geometry| {
+        let (arc, range) = (format!("{:.0} deg", g.arc_rad.to_degrees()), format!("{} m", g.range_m));
+        [g.count.to_string(), arc, range, short(g.median), format!("{:.0} %", 100.0 * g.degenerate_share)]
+    };
+    let text = format!(
+        include_str!("observability.md"),
         length = homeward.length_m,
         limit = DEGENERATE,
-        cases = cases_table(&cases(&landmarks, start)),
+        cases = table_of_numbers(
+            "case | rank of O | condition | condition with R theta for theta",
+            1,
+            cases(&landmarks, start).into_iter().map(case)
+        ),
         share = 100.0 * homeward.degenerate_share(),
         median = homeward.condition_quantile(0.5),
-        east_share = 100.0 * east.degenerate_share(),
-        geometries = geometries_table(&geometries()),
+        east = 100.0 * east.degenerate_share(),
+        geometries = table_of_numbers(
+            "landmarks | over an arc of | at | median condition | degenerate",
+            0,
+            geometries().into_iter().map(geometry)
+        ),
     );
-    text.push('\n');
-    let figures = vec![
-        ("observability-homeward.svg", map_svg(&world, homeward, "driving towards home").into_bytes()),
-        ("observability-east.svg", map_svg(&world, east, "facing along x").into_bytes()),
-        ("observability-paths.svg", paths_svg(runs, &ideal.landmarks).into_bytes()),
-    ];
-    Ok(Section { target: Target::Observability, markdown: text, figures })
+    let homeward = map_svg(&evidence.world, homeward, "driving towards home");
+    let drawings = [homeward, map_svg(&evidence.world, &east, "facing along x"), paths_svg(evidence.table_one()?, ideal)];
+    Ok(Section::new(Target::Observability, text, drawings.map(String::into_bytes)))
 }
 
 /// A map as a table: one row a place; `inf` where the block is singular.
@@ -62,7 +60,7 @@ pub fn map_csv(map: &ObservabilityMap) -> String {
     let mut text = "x_m,y_m,landmarks,rank,condition,best_condition,median_condition\n".to_owned();
     for p in &map.places {
         let (rank, median) = (p.landmarks + p.rank, p.median_condition);
-        let _ = writeln!(text, "{},{},{},{rank},{},{},{median}", p.x_m, p.y_m, p.landmarks, p.condition, p.best_condition);
+        text += &format!("{},{},{},{rank},{},{},{median}\n", p.x_m, p.y_m, p.landmarks, p.condition, p.best_condition);
     }
     text
 }
@@ -98,55 +96,17 @@ pub fn summary(map: &ObservabilityMap, facing: &str) -> String {
     )
 }
 
-fn cases_table(cases: &[Case]) -> String {
-    let mut text = "| case | rank of O | condition | condition with R theta for theta |\n|---|---:|---:|---:|\n".to_owned();
-    for case in cases {
-        let o = case.found;
-        let _ = writeln!(
-            text,
-            "| {} | {} of {} | {} | {} |",
-            case.name,
-            o.rank,
-            o.landmarks + 3,
-            short(o.condition),
-            short(o.condition_in_plane)
-        );
-    }
-    text
-}
-
-fn geometries_table(geometries: &[Geometry]) -> String {
-    let mut text = "Over landmark geometries, 400 random poses 0.3 to 1.2 m from home, any heading, R in metres:\n\n| landmarks | over an \
-         arc of | at | median condition | degenerate |\n|---:|---:|---:|---:|---:|\n"
-        .to_owned();
-    for g in geometries {
-        let _ = writeln!(
-            text,
-            "| {} | {:.0} deg | {} m | {} | {:.0} % |",
-            g.count,
-            g.arc_rad.to_degrees(),
-            g.range_m,
-            short(g.median),
-            100.0 * g.degenerate_share
-        );
-    }
-    text
-}
-
-fn paths_svg(runs: &[Run], landmarks: &[Vector2<f64>]) -> String {
-    let chart = Chart::new(
-        "Condition of [J K P] along the paths of Fig. 3",
-        Axis::linear("time (s)"),
-        Axis::log("condition").from(1.0).to(1e6),
-    );
-    let chart = runs.iter().fold(chart, |chart, run| {
-        let k = run.start.bytes().last().map_or(0, |digit| usize::from(digit.saturating_sub(b'1')));
-        let (stroke, law) = match run.law {
-            Law::Proportional => (Stroke::series(k), "proportional"),
-            Law::Lyapunov => (Stroke::series(k).dashed("3 3"), "nonlinear"),
+fn paths_svg(runs: &[Run], ideal: &Ideal) -> String {
+    let y = Axis::log("condition").from(1.0).to(1e6);
+    let mut chart = Chart::new("Condition of [J K P] along the paths of Fig. 3", Axis::linear("time (s)"), y);
+    for run in runs {
+        let k = STARTS.iter().position(|start| *start == run.start).unwrap_or(0);
+        let stroke = match run.law {
+            Law::Proportional => Stroke::series(k),
+            Law::Lyapunov => Stroke::series(k).dashed("3 3"),
         };
-        let points = along(run, landmarks).into_iter().map(|[t, c]| [t, if c.is_finite() { c.min(1e6) } else { 1e6 }]);
-        chart.line(points, &stroke, &format!("{}, {law}", run.start))
-    });
+        let points = ideal.conditions(&run.track).into_iter().map(|[t, c]| [t, if c.is_finite() { c.min(1e6) } else { 1e6 }]);
+        chart = chart.line(points, &stroke, &format!("{}, {}", run.start, law_name(run.law)));
+    }
     chart.to_svg()
 }

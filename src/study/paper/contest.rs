@@ -7,17 +7,20 @@
 //! compass, the anchored filter has nothing.
 
 use rayon::prelude::*;
+use strum::IntoStaticStr;
 
+use super::LAWS;
+use super::course::{Course, StartError, Variant};
 use super::ideal::Ideal;
-use super::images::{ImageCase, image_settings};
-use super::trial::{self, Eyes, paper_ekf};
+use super::images::ImageCase;
+use super::trial::{self, Eyes};
+use crate::control::Law;
 use crate::control::vectors::VectorLaw;
-use crate::control::{BETA, Law};
 use crate::episode::Setup;
 use crate::error::Result;
-use crate::geometry::{Pose, Vector2};
-use crate::method::{MethodKind, untold};
-use crate::observation::HomeSnapshot;
+use crate::geometry::Pose;
+use crate::method::MethodKind;
+use crate::study::statistics::mean;
 
 /// Ts of Fig. 8, s.
 const PERIOD_S: f64 = 0.01;
@@ -25,68 +28,65 @@ const PERIOD_S: f64 = 0.01;
 const SPEED_M_S: f64 = 0.10;
 
 /// What a method is told beside bearings and odometry.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, IntoStaticStr)]
 pub enum Told {
     /// The true pose at the start.
+    #[strum(serialize = "the true start")]
     Start,
     /// The true heading all the way.
+    #[strum(serialize = "a perfect compass")]
     Compass,
-    /// Nothing.
+    /// Nothing; the paper's filter is then started at R = 50 cm, theta = 0.1, alpha = 0.
+    #[strum(serialize = "nothing")]
     Nothing,
 }
 
-/// A method with its steering.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Entrant {
-    /// The paper's filter.
-    Paper(Law),
-    /// The same, told nothing: started at R = 50 cm, theta = 0.1, alpha = 0.
-    PaperUntold(Law),
-    /// The anchored filter.
-    Anchored(Law),
-    /// A homing vector.
-    Vector(VectorLaw, Law, Told),
+/// A method with its steering and what it is told.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Entrant {
+    /// What decides.
+    pub method: MethodKind,
+    /// What steers it.
+    pub law: Law,
+    /// What it is told.
+    pub told: Told,
 }
 
 impl Entrant {
     /// All, in the order of the table.
     #[must_use]
     pub fn all() -> Vec<Self> {
-        let laws = super::LAWS;
-        let mut all: Vec<Self> = laws.map(Self::Paper).into();
-        all.extend(laws.map(Self::PaperUntold));
-        all.extend(laws.map(Self::Anchored));
-        for told in [Told::Compass, Told::Nothing] {
-            all.extend(VectorLaw::ALL.into_iter().flat_map(|vector| laws.map(|law| Self::Vector(vector, law, told))));
-        }
-        all
+        let filters = [
+            (MethodKind::PaperEkf, Told::Start),
+            (MethodKind::PaperEkf, Told::Nothing),
+            (MethodKind::AnchoredEkf, Told::Nothing),
+        ];
+        let vectors = [Told::Compass, Told::Nothing].map(|told| VectorLaw::ALL.map(|vector| (MethodKind::from(vector), told)));
+        let methods = filters.into_iter().chain(vectors.into_iter().flatten());
+        methods.flat_map(|(method, told)| LAWS.map(|law| Self { method: method.clone(), law, told })).collect()
     }
 
-    /// What it is told.
+    /// Whether it steers by a homing vector and estimates nothing.
     #[must_use]
-    pub fn told(self) -> Told {
-        match self {
-            Self::Paper(_) => Told::Start,
-            Self::PaperUntold(_) | Self::Anchored(_) => Told::Nothing,
-            Self::Vector(_, _, told) => told,
+    pub fn is_vector(&self) -> bool {
+        !matches!(self.method, MethodKind::PaperEkf | MethodKind::AnchoredEkf)
+    }
+
+    /// Whether it is shown on all objects too.
+    fn can_use_more(&self) -> bool {
+        match self.method {
+            MethodKind::AnchoredEkf => true,
+            MethodKind::Alv | MethodKind::Ibvs => self.told == Told::Compass,
+            _ => false,
         }
     }
 
     /// The same as a setup of a run from `start` (home frame).
-    fn setup(self, start: Pose) -> Setup {
-        match self {
-            Self::Paper(law) => paper_ekf(law, BETA, image_settings(), start),
-            Self::PaperUntold(law) => paper_ekf(law, BETA, image_settings(), untold()),
-            Self::Anchored(law) => trial::method(MethodKind::AnchoredEkf, law),
-            Self::Vector(vector, law, _) => trial::method(vector.into(), law),
-        }
-    }
-
-    /// What steers it.
-    #[must_use]
-    pub fn law(self) -> Law {
-        match self {
-            Self::Paper(law) | Self::PaperUntold(law) | Self::Anchored(law) | Self::Vector(_, law, _) => law,
+    fn setup(&self, start: &Pose) -> Setup {
+        match (&self.method, self.told) {
+            (MethodKind::PaperEkf, Told::Start) => Variant::of_images().setup(self.law, start),
+            (MethodKind::PaperEkf, _) => Variant::of_images().started(StartError::Untold).setup(self.law, start),
+            (method, _) => trial::method(method.clone(), self.law),
         }
     }
 }
@@ -111,22 +111,21 @@ pub struct Row {
     pub times_s: [Option<f64>; 4],
     /// Distance from home at the end of each run, m: Rc or a little less where it came home.
     pub ends_m: [f64; 4],
+    /// Mean over the starts of time over straight-line time; `None` if it did not come home from all of them.
+    pub mean_ratio: Option<f64>,
 }
 
 impl Row {
-    /// Mean over the starts of time over straight-line time; `None` if it did not come home from all of them.
+    /// From how many starts it came home.
     #[must_use]
-    pub fn mean_ratio(&self, straight_s: &[f64; 4]) -> Option<f64> {
-        let ratios = self.times_s.iter().zip(straight_s).map(|(time, straight)| Some((*time)? / straight));
-        ratios.collect::<Option<Vec<f64>>>().map(|r| r.iter().sum::<f64>() / r.len() as f64)
+    pub fn home(&self) -> usize {
+        self.times_s.iter().flatten().count()
     }
 }
 
 /// One of the two parts of Fig. 8.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Contest {
-    /// Where bearings come from.
-    pub source: Source,
     /// Time of the straight way from each start to Rc, s: no method at this speed is faster.
     pub straight_s: [f64; 4],
     /// All methods.
@@ -134,48 +133,43 @@ pub struct Contest {
 }
 
 impl Contest {
-    /// The row of an entrant that sees the paper's three objects.
+    /// The row of a method that sees the paper's three objects.
     #[must_use]
-    pub fn row(&self, entrant: Entrant) -> Option<&Row> {
-        self.rows.iter().find(|row| row.entrant == entrant && row.objects == 3)
+    pub fn row(&self, method: &MethodKind, law: Law, told: Told) -> Option<&Row> {
+        let is = |e: &Entrant| e.method == *method && e.law == law && e.told == told;
+        self.rows.iter().find(|row| is(&row.entrant) && row.objects == 3)
     }
 }
 
 /// Runs all methods on a set's three objects, and then those that can use more on all of its objects.
 ///
 /// # Errors
-/// When the anchored filter cannot be built.
+/// When the set has fewer than three objects.
 pub fn contest(case: &ImageCase, source: Source) -> Result<Contest> {
     let mut world = case.world.clone();
     (world.spec.task.control_period_s, world.spec.task.speed_m_s) = (PERIOD_S, SPEED_M_S);
     world.spec.robot.max_speed_m_s = SPEED_M_S;
-    let points: Vec<Vector2<f64>> = case.field.objects.iter().filter_map(|o| case.field.fix(o)).map(|fix| fix.point).collect();
-    let crowd = Entrant::all().into_iter().filter(|entrant| {
-        matches!(entrant, Entrant::Anchored(_) | Entrant::Vector(VectorLaw::Alv | VectorLaw::Ibvs, _, Told::Compass))
-    });
-    let all = points.len();
-    let entries: Vec<(Entrant, usize)> =
-        Entrant::all().into_iter().map(|e| (e, 3)).chain(crowd.map(|e| (e, all)).filter(|_| all > 3)).collect();
-    let enter = |&(entrant, objects): &(Entrant, usize)| -> Result<Row> {
-        let exact = Ideal { landmarks: points[..objects.min(all)].to_vec(), starts: Vec::new(), world: world.clone() };
-        let compass = entrant.told() == Told::Compass;
-        let mut row = Row { entrant, objects, times_s: [None; 4], ends_m: [f64::NAN; 4] };
-        for (k, &(_, start)) in case.starts.iter().enumerate() {
-            let setup = entrant.setup(start);
-            let track = match source {
-                Source::Images => case.run(&world, &setup, start, objects, compass)?,
-                Source::Points => {
-                    let home = HomeSnapshot { bearings: exact.bearings(&Pose::IDENTITY) };
-                    let look = Box::new(|pose: &Pose| exact.bearings(pose));
-                    trial::run(&world, &setup, start, Eyes { home, look, compass })?
-                }
-            };
-            (row.times_s[k], row.ends_m[k]) = (track.time_s(), track.final_distance_m());
-        }
-        Ok(row)
+    let fixes = case.field.objects.iter().filter_map(|o| case.field.fix(o));
+    let landmarks: Vec<_> = fixes.map(|fix| fix.point).collect();
+    let all = landmarks.len();
+    let exact = Ideal { landmarks, starts: case.starts.clone(), world: world.clone(), noise: None };
+    let course: &(dyn Course + Sync) = match source {
+        Source::Images => case,
+        Source::Points => &exact,
     };
-    let rows = entries.par_iter().map(enter).collect::<Result<_>>()?;
-    let task = &world.spec.task;
-    let straight = |k: usize| (case.starts[k].1.position().norm() - task.arrival_radius_m) / task.speed_m_s;
-    Ok(Contest { source, straight_s: std::array::from_fn(straight), rows })
+    let crowd = Entrant::all().into_iter().filter(|entrant| all > 3 && entrant.can_use_more());
+    let entries: Vec<(Entrant, usize)> = Entrant::all().into_iter().map(|e| (e, 3)).chain(crowd.map(|e| (e, all))).collect();
+    let straight_s: [f64; 4] = std::array::from_fn(|k| trial::straight_s(&case.starts[k].1, &world.spec.task));
+    let enter = |(entrant, objects): (Entrant, usize)| -> Result<Row> {
+        let (mut times_s, mut ends_m) = ([None; 4], [f64::NAN; 4]);
+        for (k, (_, start)) in case.starts.iter().enumerate() {
+            let eyes = Eyes { compass: entrant.told == Told::Compass, ..course.eyes(objects) };
+            let track = trial::run(&world, &entrant.setup(start), *start, eyes)?;
+            (times_s[k], ends_m[k]) = (track.time_s(), track.final_distance_m());
+        }
+        let ratios = times_s.iter().zip(straight_s).map(|(time, straight)| Some((*time)? / straight));
+        let mean_ratio = ratios.collect::<Option<Vec<f64>>>().and_then(mean);
+        Ok(Row { entrant, objects, times_s, ends_m, mean_ratio })
+    };
+    Ok(Contest { straight_s, rows: entries.into_par_iter().map(enter).collect::<Result<_>>()? })
 }

@@ -6,20 +6,19 @@
 use std::path::Path;
 use std::sync::Mutex;
 
-use super::ideal::Run;
+use super::course::{Course, Starts, starts};
 use super::objects::ObjectField;
-use super::trial::{self, Eyes, Track, paper_ekf, unlimited};
-use super::{LAWS, STARTS};
-use crate::control::BETA;
-use crate::episode::Setup;
+use super::trial::{Eyes, unlimited};
 use crate::error::{Error, Result};
-use crate::estimation::paper::PaperSettings;
 use crate::geometry::Pose;
 use crate::panorama::Panorama;
 use crate::panorama_set::{Grid, LayoutKind, PanoramaSet, Place};
 use crate::render::{CpuRenderer, Renderer, Scene, View};
 use crate::vision::ExtractorSettings;
 use crate::world::World;
+
+/// What is stated of bearings that are interpolated between places, rad: about half a degree.
+const SD_RAD: f64 = 0.01;
 
 /// One of the two sets.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -52,21 +51,16 @@ impl ImageSet {
         }
     }
 
-    /// The layout of such a set on disk.
-    #[must_use]
-    pub fn layout(self) -> LayoutKind {
-        match self {
-            Self::Paper => LayoutKind::Paper,
-            Self::Vardy => LayoutKind::Vardy,
-        }
-    }
-
     /// Such a set on disk.
     ///
     /// # Errors
     /// When it is not whole or has another grid.
     pub fn open(self, folder: &Path) -> Result<PanoramaSet> {
-        let (files, grid) = (PanoramaSet::open_as(folder, self.layout())?.whole()?, self.grid());
+        let layout = match self {
+            Self::Paper => LayoutKind::Paper,
+            Self::Vardy => LayoutKind::Vardy,
+        };
+        let (files, grid) = (PanoramaSet::open_as(folder, layout)?.whole()?, self.grid());
         if files.shape() != (grid.rows, grid.columns) {
             return Err(Error::Unfit {
                 what: format!("grid of the set in {}", folder.display()),
@@ -99,8 +93,8 @@ pub struct ImageCase {
     pub home: Panorama,
     /// Its objects.
     pub field: ObjectField,
-    /// The paper's starts, in the home frame.
-    pub starts: Vec<(&'static str, Pose)>,
+    /// The paper's starts.
+    pub starts: Starts,
     /// Home, Ts = 0.1 s, v, Rc and the time limit.
     pub world: World,
 }
@@ -138,37 +132,22 @@ impl ImageCase {
                 ObjectField::extract(grid, &set.extractor(), &render)?
             }
         };
-        let starts = STARTS.into_iter().map(|name| Ok((name, world.home.to_local(&world.named_start(name)?))));
-        let (rendered, starts) = (folder.is_none(), starts.collect::<Result<_>>()?);
+        let (rendered, starts) = (folder.is_none(), starts(&world)?);
         Ok(Self { set, rendered, home, field, starts, world: unlimited(&world) })
-    }
-
-    /// One run of `setup` from `start` (home frame) on the first `objects` objects, in `world` instead of the set's own where it has
-    /// another task.
-    ///
-    /// # Errors
-    /// When the method needs more landmarks than there are.
-    pub fn run(&self, world: &World, setup: &Setup, start: Pose, objects: usize, compass: bool) -> Result<Track> {
-        let look = Box::new(|pose: &Pose| self.field.bearings(pose, objects, SD_RAD));
-        trial::run(world, setup, start, Eyes { home: self.field.home(objects, SD_RAD), look, compass })
-    }
-
-    /// The paper's filter with its settings for images (M = I) but for those of `settings`, from all starts with both laws.
-    ///
-    /// # Errors
-    /// When the set has fewer than three objects.
-    pub fn runs(&self, settings: PaperSettings, initial: impl Fn(&Pose) -> Pose) -> Result<Vec<Run>> {
-        let all = LAWS.into_iter().flat_map(|law| self.starts.iter().map(move |&(name, start)| (law, name, start)));
-        let run = |law, start: Pose| self.run(&self.world, &paper_ekf(law, BETA, settings, initial(&start)), start, 3, false);
-        all.map(|(law, name, start)| Ok(Run { start: name, law, track: run(law, start)? })).collect()
     }
 }
 
-/// What is stated of bearings that are interpolated between places, rad: about half a degree.
-pub const SD_RAD: f64 = 0.01;
+impl Course for ImageCase {
+    fn world(&self) -> &World {
+        &self.world
+    }
 
-/// The paper's settings of the filter for images: Q = 0.01 I, M = I, P0 = I.
-#[must_use]
-pub fn image_settings() -> PaperSettings {
-    PaperSettings { measurement: 1.0, ..PaperSettings::default() }
+    fn starts(&self) -> &Starts {
+        &self.starts
+    }
+
+    fn eyes(&self, landmarks: usize) -> Eyes<'_> {
+        let look = Box::new(move |pose: &Pose| self.field.bearings(pose, landmarks, SD_RAD));
+        Eyes { home_pose: self.world.home, home: self.field.home(landmarks, SD_RAD), look, compass: false }
+    }
 }

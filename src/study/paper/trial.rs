@@ -5,12 +5,11 @@
 use std::ops::ControlFlow;
 
 use crate::control::{BETA, Law, Pace};
-use crate::episode::{Outcome, Parts, PlantKind, Record, Setup, Simulation, StopRule};
+use crate::episode::{BeliefError, Outcome, Parts, PlantKind, Record, Setup, Simulation, Step, StopRule};
 use crate::error::Result;
-use crate::estimation::paper::PaperSettings;
-use crate::geometry::{Pose, angle_of, wrap};
+use crate::geometry::{Pose, Twist, wrap};
 use crate::method::MethodKind;
-use crate::observation::{Bearing, HomeSnapshot};
+use crate::observation::{Bearing, Estimate, HomeSnapshot};
 use crate::random::Seed;
 use crate::sensor::Sensor;
 use crate::world::{TaskSpec, World};
@@ -26,8 +25,10 @@ pub struct Sample {
     pub time_s: f64,
     /// True pose in the home frame.
     pub truth: Pose,
-    /// The filter's pose, for a method that has one.
-    pub estimate: Option<Pose>,
+    /// The filter's, for a method that has one.
+    pub estimate: Option<Estimate>,
+    /// What the wheels are told until the next instant.
+    pub command: Twist,
 }
 
 /// What a run leaves.
@@ -47,15 +48,10 @@ pub type Rmse = [f64; 3];
 impl Track {
     fn of(record: &Record, task: &TaskSpec) -> Self {
         let sampled = record.steps.iter().filter(|step| step.seen.is_some());
-        let samples: Vec<Sample> = sampled
-            .map(|step| Sample {
-                time_s: step.time_s,
-                truth: record.home.to_local(&step.truth),
-                estimate: step.estimate.map(|e| e.pose),
-            })
-            .collect();
-        let straight_m = record.home.to_local(&record.first().truth).position().norm() - task.arrival_radius_m;
-        Self { samples, home: record.outcome == Outcome::Home, straight_s: straight_m / task.speed_m_s }
+        let local = |truth: &Pose| record.home.to_local(truth);
+        let sample = |s: &Step| Sample { time_s: s.time_s, truth: local(&s.truth), estimate: s.estimate, command: s.command };
+        let straight_s = straight_s(&local(&record.first().truth), task);
+        Self { samples: sampled.map(sample).collect(), home: record.outcome == Outcome::Home, straight_s }
     }
 
     /// Time at which the robot came within Rc; `None` if it did not.
@@ -73,11 +69,11 @@ impl Track {
     /// Errors of the estimate by (17), over the instants after the start that have one.
     #[must_use]
     pub fn rmse(&self) -> Option<Rmse> {
-        let mut sums = [0.0; 3];
-        let mut count = 0.0;
+        let (mut sums, mut count) = ([0.0; 3], 0.0);
         for sample in self.samples.iter().skip(1) {
             let Some(estimate) = sample.estimate else { continue };
-            for (sum, error) in sums.iter_mut().zip(polar_errors(&sample.truth, &estimate)) {
+            let off = BeliefError::new(&estimate, &sample.truth);
+            for (sum, error) in sums.iter_mut().zip([100.0 * off.range_m, off.bearing_rad, off.heading_rad]) {
                 *sum += error * error;
             }
             count += 1.0;
@@ -86,11 +82,10 @@ impl Track {
     }
 }
 
-/// Errors of R (cm), theta and alpha (rad).
+/// Time of the straight way from a start (home frame) to Rc, s: no method at this speed is faster.
 #[must_use]
-pub fn polar_errors(truth: &Pose, estimate: &Pose) -> [f64; 3] {
-    let (t, e) = (truth.position(), estimate.position());
-    [100.0 * (e.norm() - t.norm()), wrap(angle_of(e) - angle_of(t)), wrap(estimate.heading - truth.heading)]
+pub fn straight_s(start: &Pose, task: &TaskSpec) -> f64 {
+    (start.position().norm() - task.arrival_radius_m) / task.speed_m_s
 }
 
 /// Ts, v, Rc and the time limit of the paper's runs stand in the task of `world`. Its robot is made one without limits of its own but for
@@ -104,65 +99,55 @@ pub fn unlimited(world: &World) -> World {
     world
 }
 
-/// The paper's filter under one of its laws, started at `initial` (home frame).
-#[must_use]
-pub fn paper_ekf(law: Law, beta: f64, paper: PaperSettings, initial: Pose) -> Setup {
-    Setup { paper, pace: Pace::Constant { beta }, initial_estimate: Some(initial), ..method(MethodKind::PaperEkf, law) }
-}
-
-/// A method under the paper's stop rule: homing vectors at the paper's pace, the anchored filter at its own, which slows down to
-/// turn and stops when it is sure to be home. None of them is told where it starts.
+/// A method under the paper's stop rule: homing vectors and the paper's filter at the paper's pace, the anchored filter at its own,
+/// which slows down to turn and stops when it is sure to be home. None of them is told where it starts.
 #[must_use]
 pub fn method(method: MethodKind, law: Law) -> Setup {
     let pace = Pace::Constant { beta: BETA };
     Setup { plant: PlantKind::Unicycle, method, law, pace, stop: StopRule::Reached, ..Setup::default() }
 }
 
-/// Runs `setup` from `start` (home frame) with the bearings that `eyes` tells.
+/// Runs `setup` from `start` (home frame) with the bearings that `eyes` tell.
 ///
 /// # Errors
 /// When the method needs more landmarks than there are.
 pub fn run<'a>(world: &'a World, setup: &Setup, start: Pose, eyes: Eyes<'a>) -> Result<Track> {
-    let parts = Parts::with_sensor(world, setup.plant, Box::new(Sighted { home_pose: world.home, eyes }))?;
+    let parts = Parts::with_sensor(world, setup.plant, Box::new(eyes))?;
     let mut simulation = Simulation::from_parts(world, setup, parts);
     let record = simulation.run_from(0, world.home.compose(&start), &mut |_| ControlFlow::Continue(()))?;
     Ok(Track::of(&record, &world.spec.task))
 }
 
-/// What is seen from a pose in the home frame.
+/// Tells what is seen from a pose in the home frame. It may count its looks, to draw noise.
 pub type Look<'a> = Box<dyn FnMut(&Pose) -> Vec<Bearing> + Send + 'a>;
 
-/// What sees landmarks.
+/// A sensor whose bearings a function tells.
 pub struct Eyes<'a> {
-    /// What they saw at home.
+    /// Home in the room.
+    pub home_pose: Pose,
+    /// What was seen there.
     pub home: HomeSnapshot,
-    /// What they see from a pose in the home frame. They may count their looks, to draw noise.
+    /// What is seen on the way.
     pub look: Look<'a>,
-    /// Whether a compass comes with them that tells the true heading.
+    /// Whether there is a compass that tells the true heading.
     pub compass: bool,
 }
 
-/// Eyes as a sensor.
-struct Sighted<'a> {
-    home_pose: Pose,
-    eyes: Eyes<'a>,
-}
-
-impl Sensor for Sighted<'_> {
+impl Sensor for Eyes<'_> {
     /// The noise is drawn where the eyes are made.
     fn reset(&mut self, _seed: Seed) -> Result<()> {
         Ok(())
     }
 
     fn home(&self) -> &HomeSnapshot {
-        &self.eyes.home
+        &self.home
     }
 
     fn observe(&mut self, truth: Pose, _bodies: &[Pose]) -> Result<Vec<Bearing>> {
-        Ok((self.eyes.look)(&self.home_pose.to_local(&truth)))
+        Ok((self.look)(&self.home_pose.to_local(&truth)))
     }
 
     fn compass_rad(&mut self, truth: Pose) -> Option<f64> {
-        self.eyes.compass.then(|| wrap(truth.heading - self.home_pose.heading))
+        self.compass.then(|| wrap(truth.heading - self.home_pose.heading))
     }
 }

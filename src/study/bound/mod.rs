@@ -12,33 +12,21 @@
 //! bound it loses by linearising and deciding. Since no two runs go the same way, and passing a landmark a little nearer tells a
 //! good deal more, the bound is that of the runs' own ways: the mean of its variances over [`BOUND_RUNS`] of them.
 
-use std::collections::BTreeMap;
-use std::ops::{ControlFlow, RangeInclusive};
-use std::sync::{Arc, Mutex};
+mod path;
 
-use nalgebra::Vector3;
+use std::ops::{ControlFlow, RangeInclusive};
+
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::statistics::chi_square_95;
-use crate::episode::{BeliefError, Moment, Parts, PlantKind, Recorder, Setup, Simulation, Start};
+use super::statistics::{chi_square_95, mean};
+use crate::episode::Start;
 use crate::error::{Error, Result};
-use crate::estimation::anchored::map::Prior;
-use crate::estimation::anchored::motion::{Motion, SlipWatch};
-use crate::estimation::anchored::smoother::{Frame, Iterate, Sighting, Stretch};
-use crate::estimation::anchored::{AnchoredFilter, FilterSettings};
-use crate::geometry::{Matrix3, Pose, angle_of};
-use crate::observation::{Bearing, Estimate, LandmarkId, Odometry};
-use crate::random::{Seed, Stream, standard_normal};
-use crate::sensor::{IdealSensor, Noise, NoisySensor, Sensor};
+use crate::estimation::anchored::FilterSettings;
+use crate::random::Seed;
+use crate::sensor::Noise;
 use crate::world::World;
-
-/// Least noise of bearings, rad: what even the ideal sensor states.
-const LEAST_BEARING_SD_RAD: f64 = 1e-4;
-/// Standard deviation of the prior on an inverse range, 1/m: none, in effect. A landmark at 10 cm has 10.
-const NO_RANGE_PRIOR_SD: f64 = 100.0;
-/// The same for the direction from home of a landmark that was not seen there, rad.
-const NO_DIRECTION_PRIOR_SD: f64 = 100.0;
+use path::{Path, StepErrors};
 
 /// Runs over whose ways the bound is averaged, the first ones; fewer if there are fewer.
 pub const BOUND_RUNS: usize = 100;
@@ -77,7 +65,7 @@ impl BoundSettings {
         let invalid = |what: &str, found: String, allowed: &str| {
             Err(Error::Invalid { what: what.into(), found, allowed: allowed.into() })
         };
-        if !(LEAST_BEARING_SD_RAD..1.0).contains(&self.bearing_sd_rad) {
+        if !(path::LEAST_BEARING_SD_RAD..1.0).contains(&self.bearing_sd_rad) {
             let found = format!("{} degrees", self.bearing_sd_rad.to_degrees());
             return invalid("noise of bearings", found, "0.0058 to 57 degrees");
         }
@@ -132,18 +120,28 @@ pub struct PolarErrors {
 }
 
 impl PolarErrors {
+    fn new([range_m, bearing_rad, heading_rad]: [f64; 3]) -> Self {
+        Self { range_m, bearing_rad, heading_rad }
+    }
+
+    /// R (m), theta and alpha (rad).
+    #[must_use]
+    pub fn values(&self) -> [f64; 3] {
+        [self.range_m, self.bearing_rad, self.heading_rad]
+    }
+
     /// Of the runs together: the mean of their variances is the least mean squared error of an unbiased estimate in all of them. `None`
-    /// where one of them is unbounded.
+    /// where one of them is unbounded, and without runs.
     fn root_mean_square(each: impl Iterator<Item = Option<Self>>) -> Option<Self> {
-        let each: Vec<Self> = each.collect::<Option<_>>()?;
-        let mean = |of: fn(&Self) -> f64| (each.iter().map(|e| of(e) * of(e)).sum::<f64>() / each.len() as f64).sqrt();
-        Some(Self { range_m: mean(|e| e.range_m), bearing_rad: mean(|e| e.bearing_rad), heading_rad: mean(|e| e.heading_rad) })
+        let each = each.collect::<Option<Vec<Self>>>()?;
+        let rms = |k: usize| mean(each.iter().map(|e| e.values()[k] * e.values()[k])).map(f64::sqrt);
+        Some(Self::new([rms(0)?, rms(1)?, rms(2)?]))
     }
 
     /// By component, these over `other`.
     #[must_use]
     pub fn over(&self, other: &Self) -> [f64; 3] {
-        [self.range_m / other.range_m, self.bearing_rad / other.bearing_rad, self.heading_rad / other.heading_rad]
+        std::array::from_fn(|k| self.values()[k] / other.values()[k])
     }
 }
 
@@ -170,6 +168,23 @@ pub struct BoundRow {
 }
 
 impl BoundRow {
+    /// What runs of the filter, those that have an estimate, make of a step.
+    fn of<'a>(path: &Path<'_>, k: usize, runs: impl Iterator<Item = &'a StepErrors>, bound: Option<PolarErrors>) -> Self {
+        let runs: Vec<&StepErrors> = runs.collect();
+        let bearings: usize = runs.iter().map(|step| step.bearings).sum();
+        let nis: f64 = runs.iter().map(|step| step.nis).sum();
+        Self {
+            time_s: path.time_s(k),
+            distance_m: path.truth(k).position().norm(),
+            bound,
+            runs: runs.len(),
+            rmse: PolarErrors::root_mean_square(runs.iter().map(|step| Some(step.errors))),
+            nees: mean(runs.iter().map(|step| step.nees)),
+            nis: (bearings > 0).then(|| nis / bearings as f64),
+            bearings,
+        }
+    }
+
     /// The filter's errors over the bound, for R, theta and alpha.
     #[must_use]
     pub fn ratio(&self) -> Option<[f64; 3]> {
@@ -225,13 +240,6 @@ impl Consistency {
     }
 }
 
-/// What a run of the filter makes of a step.
-struct StepErrors {
-    belief: BeliefError,
-    nis: f64,
-    bearings: usize,
-}
-
 /// The bound along a path and the filter beside it.
 #[derive(Debug, Clone, Serialize)]
 pub struct Bound {
@@ -268,23 +276,19 @@ pub fn bound(
 ) -> Result<Bound> {
     settings.check(world, seeds)?;
     let path = Path::drive(world, settings)?;
-    let runs: Vec<(Vec<Option<StepErrors>>, Option<_>)> = seeds
-        .clone()
-        .collect::<Vec<u64>>()
-        .into_par_iter()
-        .enumerate()
-        .map(|(k, seed)| {
-            let way = path.way(world, settings, Seed(seed));
-            let errors = path.estimate(world, settings, Seed(seed), &way)?;
-            let bounds = (k < BOUND_RUNS).then(|| path.bounds(world, settings, &way)).transpose()?;
-            if watch().is_break() { Err(Error::Interrupted) } else { Ok((errors, bounds)) }
-        })
-        .collect::<Result<_>>()?;
-    let (runs, bounds): (Vec<_>, Vec<_>) = runs.into_iter().unzip();
+    let judge = |(k, seed): (usize, u64)| {
+        let way = path.way(Seed(seed));
+        let errors = path.estimate(Seed(seed), &way)?;
+        let bounds = (k < BOUND_RUNS).then(|| path.bounds(&way)).transpose()?;
+        if watch().is_break() { Err(Error::Interrupted) } else { Ok((errors, bounds)) }
+    };
+    let judged = seeds.clone().collect::<Vec<u64>>().into_par_iter().enumerate().map(judge).collect::<Result<Vec<_>>>()?;
+    let (runs, bounds): (Vec<_>, Vec<_>) = judged.into_iter().unzip();
     let each: Vec<Vec<Option<PolarErrors>>> = bounds.into_iter().flatten().collect();
-    let bounds: Vec<_> = (0..path.steps.len()).map(|k| PolarErrors::root_mean_square(each.iter().map(|b| b[k]))).collect();
+    let bounds: Vec<_> = (0..path.len()).map(|k| PolarErrors::root_mean_square(each.iter().map(|b| b[k]))).collect();
     let rows = |runs: &[Vec<Option<StepErrors>>]| -> Vec<BoundRow> {
-        (0..path.steps.len()).map(|k| path.row(k, runs.iter().filter_map(|run| run[k].as_ref()), bounds[k])).collect()
+        let row = |k: usize| BoundRow::of(&path, k, runs.iter().filter_map(|run| run[k].as_ref()), bounds[k]);
+        (0..path.len()).map(row).collect()
     };
     let group = settings.group.unwrap_or(runs.len());
     let groups: Vec<_> = runs.chunks_exact(group).map(rows).collect();
@@ -299,198 +303,6 @@ pub fn bound(
         world_sha256: world.sha256.clone(),
         version: crate::VERSION,
     })
-}
-
-/// One step of the path.
-struct PathStep {
-    /// Pose in the room.
-    truth: Pose,
-    /// Motion since the step before.
-    odometry: Odometry,
-    /// Where the world's bodies stand.
-    bodies: Vec<Pose>,
-}
-
-/// The path of a run.
-struct Path {
-    home: Pose,
-    period_s: f64,
-    steps: Vec<PathStep>,
-}
-
-impl Path {
-    /// Drives home once in closed loop, on a robot whose odometry tells the truth.
-    fn drive(world: &World, settings: &BoundSettings) -> Result<Self> {
-        let setup = Setup { plant: PlantKind::Unicycle, start: settings.start.clone(), ..Setup::default() };
-        let seed = Seed(settings.path_seed);
-        let sensor = NoisySensor::new(IdealSensor::new(world), world.landmark_count, settings.noise(), seed);
-        let parts = Parts::with_sensor(world, setup.plant, Box::new(sensor))?;
-        let mut simulation = Simulation::from_parts(world, &setup, parts);
-        let bodies = Bodies::default();
-        simulation.record_to(bodies.clone());
-        let record = simulation.run(settings.path_seed, &mut |_| ControlFlow::Continue(()))?;
-        let bodies = bodies.0.lock().map(|held| held.clone()).unwrap_or_default();
-        let steps = record
-            .steps
-            .iter()
-            .zip(bodies)
-            .enumerate()
-            .map(|(k, (step, bodies))| PathStep {
-                truth: step.truth,
-                odometry: Odometry { twist: step.odometry, dt_s: if k == 0 { 0.0 } else { world.spec.task.control_period_s } },
-                bodies,
-            })
-            .collect();
-        Ok(Self { home: world.home, period_s: world.spec.task.control_period_s, steps })
-    }
-
-    /// The steps as the filter's motion model has them.
-    fn motions(&self, settings: &FilterSettings) -> impl Iterator<Item = Motion> {
-        let (mut slip, settings) = (SlipWatch::default(), *settings);
-        self.steps.iter().map(move |step| {
-            let slip_m_s = slip.expect(&step.odometry, &settings);
-            Motion::from_odometry(&step.odometry, slip_m_s, &settings)
-        })
-    }
-
-    /// True pose in the home frame at step `k`.
-    fn truth(&self, k: usize) -> Pose {
-        self.home.to_local(&self.steps[k].truth)
-    }
-
-    /// What runs of the filter, those that have an estimate, make of step `k`.
-    fn row<'a>(&self, k: usize, runs: impl Iterator<Item = &'a StepErrors>, bound: Option<PolarErrors>) -> BoundRow {
-        let runs: Vec<&StepErrors> = runs.collect();
-        let bearings: usize = runs.iter().map(|step| step.bearings).sum();
-        let nis: f64 = runs.iter().map(|step| step.nis).sum();
-        let mean = |of: &dyn Fn(&BeliefError) -> f64| runs.iter().map(|step| of(&step.belief)).sum::<f64>() / runs.len() as f64;
-        let rmse = |of: &dyn Fn(&BeliefError) -> f64| mean(&|e| of(e) * of(e)).sqrt();
-        let some = !runs.is_empty();
-        BoundRow {
-            time_s: k as f64 * self.period_s,
-            distance_m: self.truth(k).position().norm(),
-            bound,
-            runs: runs.len(),
-            rmse: some.then(|| PolarErrors {
-                range_m: rmse(&|e| e.range_m),
-                bearing_rad: rmse(&|e| e.bearing_rad),
-                heading_rad: rmse(&|e| e.heading_rad),
-            }),
-            nees: some.then(|| mean(&|e| e.nees.unwrap_or(f64::INFINITY))),
-            nis: (bearings > 0).then(|| nis / bearings as f64),
-            bearings,
-        }
-    }
-
-    /// The bound at each step of a run whose true poses in the room these are.
-    fn bounds(&self, world: &World, settings: &BoundSettings, way: &[Pose]) -> Result<Vec<Option<PolarErrors>>> {
-        let mut sensor = IdealSensor::new(world);
-        let variance = settings.bearing_sd_rad * settings.bearing_sd_rad;
-        let looks = way.iter().zip(&self.steps);
-        let seen: Vec<Vec<Bearing>> = looks.map(|(truth, step)| sensor.observe(*truth, &step.bodies)).collect::<Result<_>>()?;
-        let mut ids: Vec<LandmarkId> = seen.iter().flatten().map(|b| b.id).collect();
-        ids.sort_unstable();
-        ids.dedup();
-        let index: BTreeMap<LandmarkId, usize> = ids.iter().enumerate().map(|(k, id)| (*id, k)).collect();
-        let bodies = world.body_poses();
-        let landmarks: Vec<[f64; 2]> = ids
-            .iter()
-            .map(|id| {
-                let place = self.home.inverse_transform(bodies[id.0 as usize].position());
-                [angle_of(place), 1.0 / place.norm()]
-            })
-            .collect();
-        let priors: Vec<Prior> = ids
-            .iter()
-            .zip(&landmarks)
-            .map(|(id, &mean)| {
-                let at_home = sensor.home().bearings.iter().any(|b| b.id == *id);
-                let direction = if at_home { variance } else { NO_DIRECTION_PRIOR_SD * NO_DIRECTION_PRIOR_SD };
-                Prior { mean, variance: [direction, NO_RANGE_PRIOR_SD * NO_RANGE_PRIOR_SD] }
-            })
-            .collect();
-        let frames: Vec<Frame> = self
-            .motions(&settings.filter(world))
-            .zip(&seen)
-            .map(|(motion, seen)| Frame {
-                motion,
-                sightings: seen
-                    .iter()
-                    .map(|b| Sighting { landmark: index[&b.id], azimuth_rad: b.azimuth_rad, variance })
-                    .collect(),
-            })
-            .collect();
-        let poses: Vec<Pose> = way.iter().map(|truth| self.home.to_local(truth)).collect();
-        let at = |k: usize| {
-            let stretch = Stretch { frames: &frames[..=k], priors: &priors, heavy_tails: false };
-            let truth = Iterate { poses: poses[..=k].to_vec(), landmarks: landmarks.clone() };
-            let covariance: Matrix3<f64> = stretch.covariance_at(&truth)?.fixed_view::<3, 3>(0, 0).into_owned();
-            let best = Estimate { pose: poses[k], covariance };
-            let errors = PolarErrors {
-                range_m: best.range_sd_m(),
-                bearing_rad: best.bearing_sd_rad(),
-                heading_rad: best.heading_sd_rad(),
-            };
-            (errors.range_m + errors.bearing_rad + errors.heading_rad).is_finite().then_some(errors)
-        };
-        Ok((0..self.steps.len()).map(at).collect())
-    }
-
-    /// True poses in the room of the run with this seed.
-    fn way(&self, world: &World, settings: &BoundSettings, seed: Seed) -> Vec<Pose> {
-        let mut straying = seed.derive("bound").stream("straying");
-        let mut truth = self.steps[0].truth;
-        let settings = settings.filter(world);
-        self.steps
-            .iter()
-            .zip(self.motions(&settings))
-            .map(|(step, motion)| {
-                if step.odometry.dt_s > 0.0 {
-                    truth = truth.compose(&strayed(&motion, &mut straying));
-                }
-                truth
-            })
-            .collect()
-    }
-
-    /// The filter's errors on a run's way, one a step where it has an estimate.
-    fn estimate(&self, world: &World, settings: &BoundSettings, seed: Seed, way: &[Pose]) -> Result<Vec<Option<StepErrors>>> {
-        let noise = seed.derive("bound");
-        let mut sensor = NoisySensor::new(IdealSensor::new(world), world.landmark_count, settings.noise(), noise);
-        let mut filter = AnchoredFilter::new(settings.filter(world), sensor.home());
-        self.steps
-            .iter()
-            .zip(way)
-            .map(|(step, &truth)| {
-                let report = filter.step(&step.odometry, &sensor.observe(truth, &step.bodies)?);
-                Ok(filter.estimate().map(|estimate| StepErrors {
-                    belief: BeliefError::new(&estimate, &self.home.to_local(&truth)),
-                    nis: report.nis,
-                    bearings: report.matched,
-                }))
-            })
-            .collect()
-    }
-}
-
-/// A step that the robot may really have made when odometry tells `motion`.
-fn strayed(motion: &Motion, stream: &mut Stream) -> Pose {
-    let normal = Vector3::from_fn(|_, _| standard_normal(stream));
-    let off = motion.covariance.cholesky().map_or_else(Vector3::zeros, |c| c.l() * normal);
-    Pose::new(motion.delta.x + off.x, motion.delta.y + off.y, motion.delta.heading + off.z)
-}
-
-/// Keeps where the bodies stood at each look.
-#[derive(Clone, Default)]
-struct Bodies(Arc<Mutex<Vec<Vec<Pose>>>>);
-
-impl Recorder for Bodies {
-    fn record(&mut self, moment: &Moment<'_>) -> Result<()> {
-        if let (Some(_), Ok(mut held)) = (moment.step.seen, self.0.lock()) {
-            held.push(moment.bodies.to_vec());
-        }
-        Ok(())
-    }
 }
 
 #[cfg(test)]
@@ -545,27 +357,5 @@ mod tests {
         let errors = |k: f64| PolarErrors { range_m: k, bearing_rad: 2.0 * k, heading_rad: 3.0 * k };
         assert_eq!(PolarErrors::root_mean_square([Some(errors(1.0)), Some(errors(7.0))].into_iter()), Some(errors(5.0)));
         assert_eq!(PolarErrors::root_mean_square([Some(errors(1.0)), None].into_iter()), None);
-    }
-
-    /// What can only help does help, and the bound scales as the noise does.
-    #[test]
-    fn information_grows_with_time_and_falls_with_noise() {
-        let settings = BoundSettings { path_seed: 3, ..BoundSettings::default() };
-        let world = World::open("lab").unwrap();
-        let path = Path::drive(&world, &settings).unwrap();
-        let straight: Vec<Pose> = path.steps.iter().map(|step| step.truth).collect();
-        let at_end = |s: &BoundSettings| path.bounds(&world, s, &straight).unwrap().last().copied().flatten().unwrap();
-        let usual = at_end(&settings);
-        let twice = BoundSettings {
-            bearing_sd_rad: 2.0 * settings.bearing_sd_rad,
-            odometry_share: 2.0 * settings.odometry_share,
-            ..settings.clone()
-        };
-        let [range, _, heading] = at_end(&twice).over(&usual);
-        // Twice all noise is twice the bound, but for the small terms of the motion model that stay.
-        assert!((1.85..2.0001).contains(&range) && (1.85..2.0001).contains(&heading), "{range} {heading}");
-        let bounds = path.bounds(&world, &settings, &straight).unwrap();
-        let early = bounds[10].unwrap();
-        assert!(early.range_m > 3.0 * bounds[40].unwrap().range_m, "motion makes range visible: {early:?}");
     }
 }
