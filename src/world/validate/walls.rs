@@ -73,9 +73,9 @@ fn check_opening(place: &str, opening: &OpeningSpec, length_m: f64, height_m: f6
     if opening.kind == Some(OpeningKind::Door) {
         faults.unless(sill_m == 0.0, format!("{place}.sill_m"), sill_m.to_string(), "0 for a door");
     }
-    // What the robot passes under must clear the camera on top of it too.
+    // What the robot passes under must clear the camera on top of it too. A camera that is at or above the ceiling is a fault of its own.
     let (robot_m, camera_m) = (spec.robot.height_m, spec.camera.height_m);
-    if sill_m == 0.0 && top_m < height_m && top_m >= robot_m && top_m <= camera_m {
+    if camera_m < spec.room.height_m && sill_m == 0.0 && top_m < height_m && top_m >= robot_m && top_m <= camera_m {
         let allowed = format!(
             "below {robot_m} (robot.height_m, so that the robot cannot pass) or above {camera_m} (camera.height_m, so that the \
              camera clears it)"
