@@ -45,7 +45,10 @@ pub(super) fn curves(title: &str, (label, levels): (&str, &[String]), unit: Unit
     let (low, high) = (ticks[0], ticks[ticks.len() - 1]);
     let y_of = |value: f64| bottom - (bottom - top) * ((value - low) / (high - low)).clamp(0.0, 1.0);
     let step = (right - left) / levels.len() as f64;
-    let columns = 2;
+    // Two labels a line where each has room beside its sample.
+    let width_px = 0.5 * (right - left + 30.0);
+    let fit = curves.iter().all(|curve| 32.0 + 6.6 * curve.label.chars().count() as f64 <= width_px);
+    let columns = if fit { 2 } else { 1 };
     let height = bottom + 48.0 + 17.0 * curves.len().div_ceil(columns) as f64;
     let mut page = Group::new().add(text(title, 4.0, 18.0, 14.0).set("font-weight", "bold").set("fill", INK));
     for tick in &ticks {
@@ -69,7 +72,7 @@ pub(super) fn curves(title: &str, (label, levels): (&str, &[String]), unit: Unit
         let at = |level: usize| left + step * (level as f64 + 0.5) + aside;
         page = page.add(draw(curve, SERIES[k % SERIES.len()], &at, &y_of));
         let corner = [
-            left - 30.0 + (k % columns) as f64 * 0.5 * (right - left + 30.0),
+            left - 30.0 + (k % columns) as f64 * width_px,
             bottom + if crowded { 60.0 } else { 52.0 } + 17.0 * (k / columns) as f64,
         ];
         let sample = line([corner[0], corner[1] - 4.0], [corner[0] + 18.0, corner[1] - 4.0]);
