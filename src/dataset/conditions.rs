@@ -113,19 +113,16 @@ fn preset<'de, T: Deserialize<'de>>(name: &'de str) -> Option<T> {
 
 impl Condition {
     /// The world as its file has it.
-    #[must_use]
     pub fn original() -> Self {
         Self { given: "original".into(), changes: Vec::new() }
     }
 
     /// As the command line has it.
-    #[must_use]
     pub fn given(&self) -> &str {
         &self.given
     }
 
     /// Name for folders and keys: letters, digits, `-` and `_`.
-    #[must_use]
     pub fn name(&self) -> String {
         self.given.replace('+', "-").replace('.', "_").replace(':', "")
     }

@@ -77,7 +77,6 @@ pub fn poses(world: &World, count: usize, seed: Seed) -> Result<Vec<Pose>> {
 }
 
 /// Some of the frames, evenly from the first to the last.
-#[must_use]
 pub fn pick(frames: &[Frame], count: usize) -> Vec<Frame> {
     let count = count.min(frames.len());
     let last = (frames.len() - usize::from(!frames.is_empty())) as f64;

@@ -99,7 +99,6 @@ impl SetFolder {
     }
 
     /// Whether a part is done: its record is there, and so are the files that it names, in full length.
-    #[must_use]
     pub fn is_done(&self, part: Part) -> bool {
         is_whole(&self.path, part)
     }

@@ -178,19 +178,16 @@ impl Plan {
     }
 
     /// What was asked for.
-    #[must_use]
     pub fn request(&self) -> &Request {
         &self.request
     }
 
     /// Frames in all.
-    #[must_use]
     pub fn frames(&self) -> usize {
         self.stages.iter().map(|s| s.kept.len()).sum()
     }
 
     /// Poses left out, in all conditions.
-    #[must_use]
     pub fn left_out(&self) -> usize {
         self.stages.iter().map(|s| s.left_out.len()).sum()
     }
@@ -210,7 +207,6 @@ impl Plan {
     }
 
     /// The poses that were left out, as a table.
-    #[must_use]
     pub fn left_out_csv(&self) -> String {
         use std::fmt::Write;
         let mut text = "condition,spot,row,column,x_m,y_m,heading_rad,in_the_way\n".to_owned();
@@ -227,7 +223,6 @@ impl Plan {
     }
 
     /// What the set is, for its `dataset.json`.
-    #[must_use]
     pub fn document(&self, renderer: &RendererInfo) -> Document {
         let (world, request) = (&self.world, &self.request);
         let heading_rad = self.spots.first().map(|s| s.robot.heading);

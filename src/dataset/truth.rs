@@ -33,7 +33,6 @@ pub struct Witness<'a> {
 
 impl<'a> Witness<'a> {
     /// From the home panorama as the camera took it, range and instances included.
-    #[must_use]
     pub fn new(world: &'a World, home: Panorama) -> Self {
         let settings = ExtractorSettings { home_features: FEATURES, ..ExtractorSettings::default() };
         let features = Extractor::new(settings, &home).home_keypoints().map(|k| k.px).collect();
@@ -41,13 +40,11 @@ impl<'a> Witness<'a> {
     }
 
     /// The home panorama.
-    #[must_use]
     pub fn home(&self) -> &Panorama {
         &self.home.panorama
     }
 
     /// What is true of a frame.
-    #[must_use]
     pub fn frame(&self, frame: &Frame, panorama: &Panorama) -> FrameTruth {
         let world = self.world;
         let camera = world.camera_pose(&frame.robot);
@@ -64,7 +61,6 @@ impl<'a> Witness<'a> {
     }
 
     /// Where home's features are in a frame: those that are seen there. The panorama is given back.
-    #[must_use]
     pub fn matches(&self, frame: &Frame, panorama: &mut Panorama) -> Vec<TrueMatch> {
         let now = Shot { panorama: std::mem::replace(panorama, Panorama::empty()), pose: self.world.camera_pose(&frame.robot) };
         let seen = self.features.iter().enumerate().filter_map(|(feature, &home_px)| {

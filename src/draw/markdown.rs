@@ -8,13 +8,11 @@
 /// let text = table("world | runs", [["lab".to_owned(), 300.to_string()]]);
 /// assert_eq!(text, "| world | runs |\n|---|---|\n| lab | 300 |\n");
 /// ```
-#[must_use]
 pub fn table(columns: &str, rows: impl IntoIterator<Item = impl AsRef<[String]>>) -> String {
     table_of_numbers(columns, usize::MAX, rows)
 }
 
 /// A table whose first `texts` columns are flush left and all others, which hold numbers, flush right.
-#[must_use]
 pub fn table_of_numbers(columns: &str, texts: usize, rows: impl IntoIterator<Item = impl AsRef<[String]>>) -> String {
     let mut text = String::from("|");
     let mut rule = String::from("|");

@@ -22,7 +22,6 @@ pub struct Sheet {
 
 impl Sheet {
     /// A sheet without pictures.
-    #[must_use]
     pub fn new() -> Self {
         Self::default()
     }
@@ -51,7 +50,6 @@ impl Sheet {
     }
 
     /// The sheet.
-    #[must_use]
     pub fn image(&self) -> RgbImage {
         let width = self.strips.iter().map(|s| s.0.width()).max().unwrap_or(1);
         let height: u32 = self.strips.iter().map(|(image, gap)| image.height() + gap).sum();

@@ -48,7 +48,6 @@ impl WorldSheet {
     }
 
     /// The sheet.
-    #[must_use]
     pub fn image(&self) -> RgbImage {
         let rows: Vec<&[RgbImage]> = self.cells.chunks(COLUMNS as usize).collect();
         let heights: Vec<u32> = rows.iter().map(|row| row.iter().map(RgbImage::height).max().unwrap_or(0)).collect();

@@ -113,7 +113,6 @@ impl Commands {
     }
 
     /// Time of the last row, s.
-    #[must_use]
     pub fn duration_s(&self) -> f64 {
         self.rows.last().map_or(0.0, |(time_s, _)| *time_s)
     }

@@ -29,7 +29,6 @@ impl Outcome {
     pub const ALL: [Self; 5] = [Self::Home, Self::Timeout, Self::Lost, Self::Stuck, Self::Failed];
 
     /// Lower-case name, as files have it.
-    #[must_use]
     pub fn name(self) -> &'static str {
         match self {
             Self::Home => "home",
@@ -113,7 +112,6 @@ pub enum Belief {
 
 impl Belief {
     /// Lower-case name, as files have it.
-    #[must_use]
     pub fn name(self) -> &'static str {
         match self {
             Self::Searching => "searching",
@@ -123,7 +121,6 @@ impl Belief {
     }
 
     /// The belief at each step; `None` while the robot coasts to rest, and all through for a method that never has an estimate.
-    #[must_use]
     pub fn of_steps(steps: &[Step]) -> Vec<Option<Self>> {
         let mut found = false;
         let ever = steps.iter().any(|s| s.estimate.is_some());
@@ -197,25 +194,21 @@ pub struct Record {
 
 impl Record {
     /// First control step.
-    #[must_use]
     pub fn first(&self) -> &Step {
         &self.steps[0]
     }
 
     /// Last control step, with the robot at rest.
-    #[must_use]
     pub fn last(&self) -> &Step {
         &self.steps[self.steps.len() - 1]
     }
 
     /// True distance from the robot to home after its end, m.
-    #[must_use]
     pub fn final_distance_m(&self) -> f64 {
         (self.last().truth.position() - self.home.position()).norm()
     }
 
     /// Distance between where the odometry alone puts the robot at the end and where it is, m.
-    #[must_use]
     pub fn odometry_drift_m(&self) -> f64 {
         (self.last().truth.position() - self.last().dead_reckoned.position()).norm()
     }

@@ -45,7 +45,6 @@ pub enum SensorKind {
 
 impl SensorKind {
     /// Whether bearings are found in panoramas, which takes most of a run's time.
-    #[must_use]
     pub fn is_seeing(self) -> bool {
         matches!(self, Self::Rendered | Self::Dataset)
     }
@@ -72,31 +71,26 @@ pub struct Look {
 
 impl Look {
     /// What this look leaves open, taken from `other`.
-    #[must_use]
     pub fn or(self, other: Self) -> Self {
         Self { light: self.light.or(other.light), camera: self.camera.or(other.camera) }
     }
 
     /// The light that it stands for in `world`.
-    #[must_use]
     pub fn light(&self, world: &World) -> LightPreset {
         self.light.unwrap_or(world.spec.light.preset)
     }
 
     /// The preset of the camera that it stands for in `world`.
-    #[must_use]
     pub fn camera(&self, world: &World) -> CameraPreset {
         self.camera.unwrap_or(world.spec.camera.preset)
     }
 
     /// The optics that it stands for in `world`.
-    #[must_use]
     pub fn optics(&self, world: &World) -> OpticsSpec {
         self.camera.map_or(world.spec.camera.optics, CameraPreset::optics)
     }
 
     /// `scene`, packed from `world`, under this light as this camera is exposed.
-    #[must_use]
     pub fn scene(&self, scene: &Scene, world: &World) -> Scene {
         scene.under(self.light(world), self.optics(world).exposure)
     }
@@ -191,20 +185,17 @@ impl Default for Setup {
 
 impl Setup {
     /// The world's task with this setup's time limit.
-    #[must_use]
     pub fn task(&self, world: &World) -> TaskSpec {
         let task = world.spec.task;
         TaskSpec { time_limit_s: self.time_limit_s.unwrap_or(task.time_limit_s), ..task }
     }
 
     /// The camera's projection in this setup.
-    #[must_use]
     pub fn projection(&self, world: &World) -> Projection {
         self.size_px.map_or_else(|| world.projection(), |(width, height)| world.projection_of_size(width, height))
     }
 
     /// Light and camera at home, and on the way.
-    #[must_use]
     pub fn looks(&self) -> [Look; 2] {
         [self.home_look.or(self.look), self.look]
     }
@@ -260,7 +251,6 @@ impl Setup {
     }
 
     /// What the method is set to in a run from `start` (in the room).
-    #[must_use]
     pub fn method_options(&self, world: &World, start: &Pose) -> MethodOptions {
         MethodOptions {
             law: self.law,
@@ -273,7 +263,6 @@ impl Setup {
     }
 
     /// What a method is told before a run.
-    #[must_use]
     pub fn briefing(&self, world: &World, sensor: &dyn Sensor) -> Briefing {
         let camera = |home: &Panorama| CameraSheet { projection: home.projection, home_rgba: home.rgba.clone() };
         Briefing {

@@ -142,7 +142,6 @@ impl<'a> Simulation<'a> {
     }
 
     /// With parts of a caller's own. Of `setup` hold the method, the start, the task and the names in summaries.
-    #[must_use]
     pub fn from_parts(world: &'a World, setup: &Setup, parts: Parts<'a>) -> Self {
         let Parts { plant, sensor } = parts;
         let task = setup.task(world);
@@ -168,19 +167,16 @@ impl<'a> Simulation<'a> {
     }
 
     /// The packed world as it was at home and as it is on the way; `None` for a sensor without a camera.
-    #[must_use]
     pub fn scenes(&self) -> Option<[Arc<Scene>; 2]> {
         self.shared.as_ref()?.scenes.clone()
     }
 
     /// The world.
-    #[must_use]
     pub fn world(&self) -> &'a World {
         self.world
     }
 
     /// The setup.
-    #[must_use]
     pub fn setup(&self) -> &Setup {
         &self.setup
     }
@@ -240,7 +236,6 @@ impl<'a> Simulation<'a> {
     }
 
     /// What a method is told before the run that was last reset.
-    #[must_use]
     pub fn briefing(&self) -> Briefing {
         self.setup.briefing(self.world, self.sensor.as_ref())
     }
@@ -281,37 +276,31 @@ impl<'a> Simulation<'a> {
     }
 
     /// How the episode stands; running before the first reset.
-    #[must_use]
     pub fn phase(&self) -> Phase {
         self.episode.as_ref().map_or(Phase::Running, |episode| episode.phase)
     }
 
     /// True pose of the robot in the room; home before the first reset.
-    #[must_use]
     pub fn truth(&self) -> Pose {
         self.episode.as_ref().map_or(self.world.home, |episode| episode.plant.truth())
     }
 
     /// What moves, with what its wheels do; `None` before the first reset.
-    #[must_use]
     pub fn plant(&self) -> Option<&dyn Plant> {
         Some(self.episode.as_ref()?.plant.as_ref())
     }
 
     /// True poses of the bodies, in the order of `World::bodies`.
-    #[must_use]
     pub fn bodies(&self) -> &[Pose] {
         self.episode.as_ref().map_or(&[], |episode| episode.plant.body_poses())
     }
 
     /// The record so far: truth, odometry, command and belief of all steps that were left.
-    #[must_use]
     pub fn steps(&self) -> &[Step] {
         self.episode.as_ref().map_or(&[], |episode| &episode.steps)
     }
 
     /// Contacts of the run so far.
-    #[must_use]
     pub fn collisions(&self) -> &[Collision] {
         self.episode.as_ref().map_or(&[], |episode| &episode.collisions)
     }

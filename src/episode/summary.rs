@@ -94,7 +94,6 @@ pub struct CollisionRecord {
 
 impl CollisionRecord {
     /// Collisions by the names that `world` has for things.
-    #[must_use]
     pub fn list(collisions: &[Collision], world: &World) -> Vec<Self> {
         let record = |c: &Collision| Self { time_s: c.time_s, with: c.with.name(world), impulse_n_s: c.impulse_n_s };
         collisions.iter().map(record).collect()
@@ -137,7 +136,6 @@ pub struct SetupRecord {
 
 impl SetupRecord {
     /// The choices of `setup` on `world`.
-    #[must_use]
     pub fn new(setup: &Setup, world: &World) -> Self {
         let task = setup.task(world);
         let projection = setup.projection(world);
@@ -197,7 +195,6 @@ pub struct Landmarks {
 
 impl Summary {
     /// Compares what happened with what the method believed.
-    #[must_use]
     pub fn new(record: &Record, world: &World, setup: &Setup, seed: u64) -> Self {
         let task = setup.task(world);
         let (start, rest) = (record.first().truth, record.last().truth);
@@ -243,7 +240,6 @@ impl Summary {
 
     /// Whether the method claimed to be home and the robot came to rest outside the arrival radius: the one meaning of a wrong claim, in
     /// all tables.
-    #[must_use]
     pub fn is_wrong_claim(&self) -> bool {
         self.claimed_home && self.outcome != Outcome::Home
     }
@@ -288,7 +284,6 @@ pub struct BeliefError {
 
 impl BeliefError {
     /// `truth` is the true pose in the home frame.
-    #[must_use]
     pub fn new(estimate: &Estimate, truth: &Pose) -> Self {
         let heading_rad = wrap(estimate.pose.heading - truth.heading);
         let error = Vector3::new(estimate.pose.x - truth.x, estimate.pose.y - truth.y, heading_rad);

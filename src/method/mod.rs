@@ -55,13 +55,11 @@ impl MethodKind {
         [Self::AnchoredEkf, Self::PaperEkf, Self::Alv, Self::TronDaniilidis, Self::Weber, Self::Ibvs];
 
     /// Name without what belongs to one program.
-    #[must_use]
     pub fn name(&self) -> &'static str {
         self.into()
     }
 
     /// Fewest landmarks in the home snapshot that the method can do with.
-    #[must_use]
     pub fn fewest_landmarks(&self) -> usize {
         match self {
             Self::AnchoredEkf | Self::PaperEkf => 3,

@@ -7,7 +7,6 @@ use crate::geometry::{Pose, Twist, direction};
 use crate::observation::{Bearing, Briefing, Decision, LandmarkId, Method, Observation, Status};
 
 /// Where a filter starts that is told nothing: R = 50 cm, theta = 0.1, alpha = 0, as good a guess as any.
-#[must_use]
 pub fn untold() -> Pose {
     let place = direction(0.1) * 0.5;
     Pose::new(place.x, place.y, 0.0)

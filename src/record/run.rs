@@ -91,7 +91,6 @@ fn write(mut folder: OutputFolder, world: &World, record: &Record, summary: &Sum
 }
 
 /// One row a control step, empty cells where there is no number.
-#[must_use]
 pub fn trajectory_csv(steps: &[Step]) -> String {
     let rows = steps.iter().copied().zip(Belief::of_steps(steps)).map(|of| csv::row(COLUMNS, &of));
     std::iter::once(csv::header(COLUMNS)).chain(rows).collect()

@@ -15,7 +15,6 @@ const HEAD: [&str; 2] = [
 ];
 
 /// A row every `every_s` seconds, and the last one.
-#[must_use]
 pub fn table(bound: &Bound, every_s: f64) -> String {
     let [first, last] = bound.seeds;
     let mut text = format!(

@@ -101,14 +101,12 @@ fn cells(s: &Standing) -> [String; 11] {
 }
 
 /// The comparison for a terminal.
-#[must_use]
 pub fn table(comparison: &Comparison) -> String {
     let rows = std::iter::once(HEAD.map(str::to_owned)).chain(comparison.standings.iter().map(cells));
     columns(2, &rows.collect::<Vec<_>>())
 }
 
 /// The comparison as Markdown.
-#[must_use]
 pub fn readme(comparison: &Comparison, command: &str, maps: &[String]) -> String {
     let c = comparison;
     let [first, last] = c.seeds;

@@ -113,7 +113,6 @@ Lengths are metres, angles radians anti-clockwise. `frame` numbers frames throug
 the same pose in every condition.\n";
 
 /// What a check found, for a terminal.
-#[must_use]
 pub fn inspection(found: &Inspection, folder: &std::path::Path) -> String {
     let mut text = String::new();
     for fault in &found.faults {

@@ -78,7 +78,6 @@ fn by_axis(study: &Robustness) -> Vec<(Axis, Vec<&Cell>)> {
 }
 
 /// The study as Markdown.
-#[must_use]
 pub fn readme(study: &Robustness, command: &str) -> String {
     let [first, last] = study.seeds;
     let setup = &study.setup;
@@ -125,7 +124,6 @@ fn markdown_row(cell: &Cell) -> [String; 8] {
 }
 
 /// The study for a terminal.
-#[must_use]
 pub fn table(study: &Robustness) -> String {
     let mut rows = vec![["axis", "level", "home", "95 %", "wrong", "ratio, 90 %", "final cm"].map(str::to_owned)];
     rows.extend(study.cells.iter().map(|cell| {

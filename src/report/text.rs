@@ -10,7 +10,6 @@ use crate::study::seeds::SeedsSummary;
 use crate::study::tally::{Spread, Tally};
 
 /// One run.
-#[must_use]
 pub fn run(summary: &Summary, folder: &Path) -> String {
     let s = summary;
     let distance = centimetres(s.final_distance_m);
@@ -81,7 +80,6 @@ pub fn run(summary: &Summary, folder: &Path) -> String {
 const MOST_COLLISIONS: usize = 20;
 
 /// An open-loop drive.
-#[must_use]
 pub fn drive(summary: &DriveSummary, folder: &Path) -> String {
     let s = summary;
     let pose = |p: &PoseRecord| format!("({:.3}, {:.3}) m, {:.1} deg", p.x_m, p.y_m, p.heading_rad.to_degrees());
@@ -107,7 +105,6 @@ pub fn drive(summary: &DriveSummary, folder: &Path) -> String {
 }
 
 /// A batch.
-#[must_use]
 pub fn seeds(batch: &SeedsSummary, rows: &[RunRow], folder: &Path) -> String {
     let t = &batch.tally;
     let mut table = vec![["seed", "outcome", "start m", "final cm", "time s", "ratio", "nees"].map(str::to_owned)];

@@ -161,7 +161,6 @@ pub struct DatasetSensor {
 
 impl DatasetSensor {
     /// Readies the extractor for the home panorama.
-    #[must_use]
     pub fn new(world: &World, field: Arc<DatasetField>, settings: ExtractorSettings) -> Self {
         let extractor = Extractor::new(settings, &field.home);
         let mut home = extractor.home_snapshot();

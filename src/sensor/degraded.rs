@@ -27,7 +27,6 @@ pub struct Degradation {
 
 impl Degradation {
     /// Whether nothing is done.
-    #[must_use]
     pub fn is_none(&self) -> bool {
         *self == Self::default()
     }

@@ -23,7 +23,6 @@ pub struct IdealSensor<'a> {
 
 impl<'a> IdealSensor<'a> {
     /// The sensor for a world.
-    #[must_use]
     pub fn new(world: &'a World) -> Self {
         let home = HomeSnapshot { bearings: look(world, world.home, &world.body_poses()) };
         Self { world, home }

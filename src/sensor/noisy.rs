@@ -46,7 +46,6 @@ pub struct NoisySensor<'a> {
 
 impl<'a> NoisySensor<'a> {
     /// Spoils `ideal`, whose world has `landmarks` landmarks, as a run of `seed` has it.
-    #[must_use]
     pub fn new(ideal: IdealSensor<'a>, landmarks: usize, noise: Noise, seed: Seed) -> Self {
         let mut at_home = seed.stream("bearing-noise-home");
         let mut home = ideal.home().clone();

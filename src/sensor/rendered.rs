@@ -56,7 +56,6 @@ pub struct RenderedSensor<'a> {
 impl<'a> RenderedSensor<'a> {
     /// A sensor in `world` that sees it as `[home, now]` say, in panoramas of `projection`. The home panorama is taken when it is
     /// reset.
-    #[must_use]
     pub fn new(
         world: &'a World,
         sights: [Sight; 2],

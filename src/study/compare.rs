@@ -71,14 +71,12 @@ pub const CONTENDERS: [Contender; 14] = [
 
 impl Contender {
     /// A program of the user's own, the `number`th of a comparison. It has a compass where one is asked for.
-    #[must_use]
     pub fn program(number: usize, command: ExecCommand, compass: bool) -> Self {
         let key = Cow::Owned(format!("exec-{number}"));
         Self { key, method: MethodKind::Exec(command), law: Law::Proportional, compass, told_start: false }
     }
 
     /// The law of its homing vector; `None` for filters, which have none at standstill.
-    #[must_use]
     pub fn vector_law(&self) -> Option<VectorLaw> {
         match self.method {
             MethodKind::AnchoredEkf | MethodKind::PaperEkf | MethodKind::Exec(_) => None,
@@ -213,7 +211,6 @@ pub fn compare(
 }
 
 /// How many runs a comparison takes.
-#[must_use]
 pub fn runs(world: &World, contenders: usize, seeds: &RangeInclusive<u64>, places: usize) -> u64 {
     let grid = grid_starts(world, places, 0.0).1.len() as u64;
     contenders as u64 * (seeds.end() - seeds.start() + 1 + grid)

@@ -68,13 +68,11 @@ pub struct ObservabilityMap {
 
 impl ObservabilityMap {
     /// Share of the places whose condition is above [`DEGENERATE`].
-    #[must_use]
     pub fn degenerate_share(&self) -> f64 {
         degenerate_share(self.places.iter().map(|p| p.condition))
     }
 
     /// A quantile of the condition over the places.
-    #[must_use]
     pub fn condition_quantile(&self, share: f64) -> f64 {
         ranked(self.places.iter().map(|p| p.condition), share)
     }
@@ -86,7 +84,6 @@ fn degenerate_share(conditions: impl Iterator<Item = f64>) -> f64 {
 }
 
 /// A quantile that is one of the values, because between infinite ones nothing can be interpolated. NaN of none.
-#[must_use]
 pub fn ranked(values: impl Iterator<Item = f64>, share: f64) -> f64 {
     let mut sorted: Vec<f64> = values.collect();
     sorted.sort_by(f64::total_cmp);
@@ -163,7 +160,6 @@ pub fn map(world: &World, facing: Facing, spacing_m: f64) -> Result<Observabilit
 }
 
 /// The degenerate cases one by one, each with what is special about it: at P2 of the paper's ideal setting but for what it says.
-#[must_use]
 pub fn cases(landmarks: &[Vector2<f64>; 3], usual: Pose) -> [(&'static str, Observability); 10] {
     let length_m = mean(landmarks.iter().map(|l| l.norm())).unwrap_or_default();
     let among = |landmarks: &[Vector2<f64>], pose: Pose| observability(&pose, landmarks, true, length_m);
@@ -207,7 +203,6 @@ pub struct Geometry {
 const POSES: u64 = 400;
 
 /// Sets of landmarks, judged over the same random poses 0.3 to 1.2 m from home. Lengths are measured in metres.
-#[must_use]
 pub fn geometries() -> Vec<Geometry> {
     use rand::RngExt;
     use std::f64::consts::TAU;

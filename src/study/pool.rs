@@ -23,7 +23,6 @@ pub struct Pool<'a> {
 
 impl Pool<'static> {
     /// A pool that nobody stops.
-    #[must_use]
     pub fn new(threads: usize) -> Self {
         static NEVER: AtomicBool = AtomicBool::new(false);
         Self { threads, stopped: &NEVER }
@@ -101,7 +100,6 @@ struct Packed {
 
 impl Scenes {
     /// None yet, and at most one for each worker.
-    #[must_use]
     pub fn of(pool: &Pool<'_>) -> Self {
         Self { most: pool.threads.max(1), packed: Mutex::default() }
     }
@@ -182,7 +180,6 @@ pub enum Broken {
 
 impl Broken {
     /// The error, for those who have no row for a panic: it goes on.
-    #[must_use]
     pub fn into_error(self) -> Error {
         match self {
             Self::Error(error) => error,

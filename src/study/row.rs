@@ -157,13 +157,11 @@ fn reason(summary: &Summary) -> String {
 
 impl RunRow {
     /// Whether the robot came home.
-    #[must_use]
     pub fn is_home(&self) -> bool {
         self.outcome == Ending::Home
     }
 
     /// As [`Summary::is_wrong_claim`].
-    #[must_use]
     pub fn is_wrong_claim(&self) -> bool {
         self.claimed_home == Some(true) && !self.is_home()
     }

@@ -82,7 +82,6 @@ pub struct SeedsSummary {
 
 impl SeedsSummary {
     /// Of the runs of `setup` on `world`.
-    #[must_use]
     pub fn new(rows: &[RunRow], seeds: &RangeInclusive<u64>, world: &World, setup: &Setup) -> Self {
         Self {
             seeds: [*seeds.start(), *seeds.end()],

@@ -9,7 +9,6 @@ const Z_95: f64 = 1.959_963_984_540_054;
 /// let [low, high] = wayhome::study::statistics::wilson_95(38, 40);
 /// assert!((low - 0.835).abs() < 5e-4 && (high - 0.986).abs() < 5e-4);
 /// ```
-#[must_use]
 pub fn wilson_95(successes: usize, trials: usize) -> [f64; 2] {
     if trials == 0 {
         return [0.0, 1.0];
@@ -49,13 +48,11 @@ impl Paired {
     }
 
     /// Number of trials.
-    #[must_use]
     pub fn trials(&self) -> usize {
         self.both + self.only_first + self.only_second + self.neither
     }
 
     /// Share in which the first succeeded less that of the second; 0 without trials.
-    #[must_use]
     pub fn difference(&self) -> f64 {
         (self.only_first as f64 - self.only_second as f64) / self.trials().max(1) as f64
     }
@@ -70,7 +67,6 @@ impl Paired {
     /// let [low, high] = Paired { both: 1, only_first: 1, only_second: 7, neither: 12 }.difference_95();
     /// assert!((low + 0.507).abs() < 5e-4 && (high + 0.026).abs() < 5e-4);
     /// ```
-    #[must_use]
     pub fn difference_95(&self) -> [f64; 2] {
         let trials = self.trials();
         if trials == 0 {
@@ -94,7 +90,6 @@ impl Paired {
 
     /// Two-sided P value of McNemar's test (1947) by the mid-P rule: how likely so unequal a split of the trials in which only one
     /// succeeded is, if both are equally good. 1 where there are none.
-    #[must_use]
     pub fn mid_p(&self) -> f64 {
         let (few, all) = (self.only_first.min(self.only_second), self.only_first + self.only_second);
         let log_choose = |k: usize| {
@@ -115,7 +110,6 @@ const BOOTSTRAP_DRAWS: usize = 2000;
 /// Mean of `sum / count` over clusters, all sums over all counts, and its 95 % percentile bootstrap interval (Efron 1979): whole
 /// clusters are drawn with replacement, so that what is alike within a cluster does not pass for many independent trials. The same
 /// clusters give the same interval. `None` without counts.
-#[must_use]
 pub fn cluster_bootstrap_95(clusters: &[(f64, usize)]) -> Option<(f64, [f64; 2])> {
     use rand::RngExt;
     let mean = |drawn: &mut dyn Iterator<Item = &(f64, usize)>| {
@@ -135,14 +129,12 @@ pub fn cluster_bootstrap_95(clusters: &[(f64, usize)]) -> Option<(f64, [f64; 2])
 }
 
 /// Mean of the values; `None` of none.
-#[must_use]
 pub fn mean(values: impl IntoIterator<Item = f64>) -> Option<f64> {
     let (sum, count) = values.into_iter().fold((0.0, 0_usize), |(sum, count), value| (sum + value, count + 1));
     (count > 0).then(|| sum / count as f64)
 }
 
 /// Quantile of the values at `share` in [0, 1], linear between neighbours; `None` of no values. NaN sorts last.
-#[must_use]
 pub fn quantile(values: &[f64], share: f64) -> Option<f64> {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
@@ -162,7 +154,6 @@ pub fn quantile(values: &[f64], share: f64) -> Option<f64> {
 /// let [low, high] = wayhome::study::statistics::chi_square_95(600.0);
 /// assert!((low - 534.019).abs() < 1e-3 && (high - 669.769).abs() < 1e-3);
 /// ```
-#[must_use]
 pub fn chi_square_95(freedom: f64) -> [f64; 2] {
     [0.025, 0.975].map(|share| chi_square_quantile(freedom, share))
 }

@@ -38,7 +38,6 @@ pub struct Tally {
 
 impl Tally {
     /// Of these runs.
-    #[must_use]
     pub fn of<'a>(runs: impl IntoIterator<Item = &'a RunRow>) -> Self {
         let runs: Vec<&RunRow> = runs.into_iter().collect();
         let spread = |of: fn(&RunRow) -> Option<f64>| Spread::of(runs.iter().filter_map(|run| of(run)));
@@ -91,7 +90,6 @@ fn is_zero(count: &usize) -> bool {
 
 impl OutcomeCounts {
     /// All but those at home, each with its name.
-    #[must_use]
     pub fn others(&self) -> [(&'static str, usize); 6] {
         let Self { home: _, timeout, lost, stuck, failed, panic, error } = *self;
         [("timeout", timeout), ("lost", lost), ("stuck", stuck), ("failed", failed), ("panic", panic), ("error", error)]
@@ -132,7 +130,6 @@ pub struct Spread {
 
 impl Spread {
     /// Of the given values.
-    #[must_use]
     pub fn of(values: impl Iterator<Item = f64>) -> Self {
         let values: Vec<f64> = values.collect();
         let at = |share| quantile(&values, share);

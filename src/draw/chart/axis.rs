@@ -6,6 +6,7 @@ use crate::draw::shapes::{line, number, px, text, ticks};
 
 /// An axis with its name, its scale, and its range where it is told.
 #[derive(Debug, Clone, PartialEq)]
+#[must_use]
 pub struct Axis {
     /// Name with unit.
     pub(crate) label: String,
@@ -26,25 +27,21 @@ pub(crate) struct Placed {
 
 impl Axis {
     /// An even axis.
-    #[must_use]
     pub fn linear(label: impl Into<String>) -> Self {
         Self { label: label.into(), log: false, low: None, high: None }
     }
 
     /// A logarithmic axis. Values that are not positive have no place on it.
-    #[must_use]
     pub fn log(label: impl Into<String>) -> Self {
         Self { log: true, ..Self::linear(label) }
     }
 
     /// Sets where it begins.
-    #[must_use]
     pub fn from(self, low: f64) -> Self {
         Self { low: Some(low), ..self }
     }
 
     /// Sets where it ends.
-    #[must_use]
     pub fn to(self, high: f64) -> Self {
         Self { high: Some(high), ..self }
     }

@@ -43,7 +43,6 @@ pub struct Bars {
 
 impl Bars {
     /// The drawing as SVG text. The same chart gives the same bytes.
-    #[must_use]
     pub fn to_svg(&self) -> String {
         let [left, top, right, bottom] = PLOT_PX;
         let values: Vec<f64> = self.series.iter().flat_map(|s| s.values.iter().flatten().copied()).chain([0.0]).collect();

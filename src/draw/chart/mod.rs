@@ -40,6 +40,7 @@ pub const SERIES: [&str; 6] = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69
 
 /// How a line is drawn.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[must_use]
 pub struct Stroke {
     /// Colour, as SVG has it.
     pub colour: &'static str,
@@ -56,13 +57,11 @@ impl Stroke {
     pub const BOUND: Self = Self { colour: FAINT_INK, width_px: 1.3, dashes: "5 4" };
 
     /// A full line in one of the [`SERIES`] colours, round and round.
-    #[must_use]
     pub fn series(k: usize) -> Self {
         Self { colour: SERIES[k % SERIES.len()], width_px: 1.8, dashes: "" }
     }
 
     /// The same line with dashes.
-    #[must_use]
     pub fn dashed(self, dashes: &'static str) -> Self {
         Self { dashes, ..self }
     }
@@ -82,7 +81,6 @@ impl Mark {
     pub const MEASURED: Self = Self { colour: SERIES[1], radius_px: 4.0 };
 
     /// A disc in one of the [`SERIES`] colours, round and round.
-    #[must_use]
     pub fn series(k: usize) -> Self {
         Self { colour: SERIES[k % SERIES.len()], radius_px: 3.6 }
     }
@@ -114,6 +112,7 @@ enum Layer {
 
 /// A chart that is being drawn.
 #[derive(Debug, Clone)]
+#[must_use]
 pub struct Chart {
     title: String,
     x: Axis,
@@ -124,41 +123,35 @@ pub struct Chart {
 
 impl Chart {
     /// An empty chart.
-    #[must_use]
     pub fn new(title: impl Into<String>, x: Axis, y: Axis) -> Self {
         Self { title: title.into(), x, y, layers: Vec::new(), notes: Vec::new() }
     }
 
     /// Adds a line through points. Points that are not finite break it.
-    #[must_use]
     pub fn line(mut self, points: impl IntoIterator<Item = [f64; 2]>, stroke: &Stroke, label: &str) -> Self {
         self.layers.push(Layer::Line(points.into_iter().collect(), *stroke, label.to_owned()));
         self
     }
 
     /// Adds points. Those that are not finite are left out.
-    #[must_use]
     pub fn points(mut self, points: impl IntoIterator<Item = [f64; 2]>, mark: &Mark, label: &str) -> Self {
         self.layers.push(Layer::Points(points.into_iter().collect(), *mark, label.to_owned()));
         self
     }
 
     /// Adds a field of coloured cells.
-    #[must_use]
     pub fn heat(mut self, map: HeatMap) -> Self {
         self.layers.push(Layer::Heat(map));
         self
     }
 
     /// Adds a line of text below the legend.
-    #[must_use]
     pub fn note(mut self, note: impl Into<String>) -> Self {
         self.notes.push(note.into());
         self
     }
 
     /// The drawing as SVG text.
-    #[must_use]
     pub fn to_svg(&self) -> String {
         let [left, top, right, bottom] = PLOT_PX;
         let (mut xs, mut ys) = (Vec::new(), Vec::new());

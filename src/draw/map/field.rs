@@ -17,7 +17,6 @@ const SPOT_PX: f64 = 5.0;
 impl MapDrawing {
     /// Covers the floor with square cells of `size_m`, given as (middle, value) row by row. Values beyond the ramp take its ends'
     /// colours; cells whose value is NaN are left out.
-    #[must_use]
     pub fn field(mut self, cells: impl IntoIterator<Item = (Vector2<f64>, f64)>, size_m: f64, ramp: Ramp, label: &str) -> Self {
         let step = |value: f64| {
             let share = ((value - ramp.low) / (ramp.high - ramp.low)).clamp(0.0, 1.0);
@@ -58,7 +57,6 @@ impl MapDrawing {
     }
 
     /// Adds arrows, each through a point of the room frame along a heading, `length_m` long.
-    #[must_use]
     pub fn arrows(mut self, arrows: impl IntoIterator<Item = (Vector2<f64>, f64)>, length_m: f64, label: &str) -> Self {
         let length = length_m * self.frame.px_per_m;
         for (point, heading_rad) in arrows {
@@ -70,7 +68,6 @@ impl MapDrawing {
     }
 
     /// Adds spots at points of the room frame.
-    #[must_use]
     pub fn spots(mut self, points: impl IntoIterator<Item = Vector2<f64>>, colour: &'static str, label: &str) -> Self {
         for point in points {
             let spot =

@@ -69,6 +69,7 @@ impl PathStyle {
 
 /// A map that is being drawn: the world, and layers added one by one.
 #[derive(Debug, Clone)]
+#[must_use]
 pub struct MapDrawing {
     frame: Frame,
     title: Option<String>,
@@ -88,7 +89,6 @@ pub struct MapDrawing {
 
 impl MapDrawing {
     /// A map of a world as it is at time 0.
-    #[must_use]
     pub fn new(world: &World) -> Self {
         let mut drawing = Self {
             frame: Frame::around(&world.outline),
@@ -109,21 +109,18 @@ impl MapDrawing {
     }
 
     /// Sets the line above the map.
-    #[must_use]
     pub fn title(mut self, title: impl Into<String>) -> Self {
         self.title = Some(title.into());
         self
     }
 
     /// Leaves out the legend, for a small drawing beside words that explain it.
-    #[must_use]
     pub fn without_legend(mut self) -> Self {
         self.has_legend = false;
         self
     }
 
     /// Adds a path through points of the room frame, m. Points that are not finite break the line.
-    #[must_use]
     pub fn path(mut self, points: impl IntoIterator<Item = Vector2<f64>>, style: &PathStyle, label: &str) -> Self {
         let mut piece = Vec::new();
         let mut pieces = Vec::new();
@@ -144,7 +141,6 @@ impl MapDrawing {
 
     /// Adds the ellipse of `k_sigma` standard deviations around a position of the room frame. `covariance` is that of x and y
     /// in the room frame, row by row, m^2. One that is not finite is left out.
-    #[must_use]
     pub fn ellipse(mut self, centre: &Pose, covariance: [[f64; 2]; 2], k_sigma: f64) -> Self {
         let (radii_m, angle_rad) = ellipse_axes(covariance, k_sigma);
         if centre.is_finite() && radii_m[0].is_finite() && angle_rad.is_finite() {
@@ -157,13 +153,11 @@ impl MapDrawing {
     }
 
     /// Marks where a run started: the robot's outline and heading.
-    #[must_use]
     pub fn start(self, pose: &Pose) -> Self {
         self.robot(pose, INK, INK, "start of the run")
     }
 
     /// Marks where a run ended: the robot's outline and heading.
-    #[must_use]
     pub fn end(self, pose: &Pose) -> Self {
         self.robot(pose, paint::END, "#ffffff", "end of the run")
     }
@@ -176,7 +170,6 @@ impl MapDrawing {
     }
 
     /// The drawing as SVG text.
-    #[must_use]
     pub fn to_svg(&self) -> String {
         let top = if self.title.is_some() { 44.0 } else { 16.0 };
         let unexplained = Legend::default();
@@ -215,7 +208,6 @@ pub(crate) fn ellipse_axes(covariance: [[f64; 2]; 2], k_sigma: f64) -> ([f64; 2]
 }
 
 /// A world's map with its name as title.
-#[must_use]
 pub fn world_svg(world: &World) -> String {
     MapDrawing::new(world).title(world.spec.name.clone()).to_svg()
 }

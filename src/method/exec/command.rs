@@ -18,6 +18,7 @@ const TIME_LIMIT: Duration = Duration::from_secs(5);
 /// The text is split into words as a shell splits them (blanks, quotes, backslashes), and no shell takes part: nothing is
 /// expanded, and the program that is started is the one that is ended. Who wants a shell names it: `sh -c '...'`.
 #[derive(Clone, PartialEq, Eq)]
+#[must_use]
 pub struct ExecCommand {
     text: Arc<str>,
     words: Arc<[String]>,
@@ -46,25 +47,21 @@ impl ExecCommand {
     }
 
     /// The same with another time limit for an answer.
-    #[must_use]
     pub fn with_time_limit(self, time_limit: Duration) -> Self {
         Self { time_limit, ..self }
     }
 
     /// How long it may take for an answer; for its first one six times as long.
-    #[must_use]
     pub fn time_limit(&self) -> Duration {
         self.time_limit
     }
 
     /// The program as written.
-    #[must_use]
     pub fn program(&self) -> &str {
         self.words.first().map_or("", String::as_str)
     }
 
     /// Its arguments.
-    #[must_use]
     pub fn arguments(&self) -> &[String] {
         self.words.get(1..).unwrap_or_default()
     }

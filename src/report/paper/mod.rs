@@ -46,7 +46,6 @@ pub enum Target {
 
 impl Target {
     /// Its name on the command line.
-    #[must_use]
     pub fn name(self) -> &'static str {
         self.into()
     }

@@ -55,7 +55,6 @@ pub(super) fn observability(evidence: &Evidence) -> Result<Section> {
 }
 
 /// A map as a table: one row a place; `inf` where the block is singular.
-#[must_use]
 pub fn map_csv(map: &ObservabilityMap) -> String {
     let mut text = "x_m,y_m,landmarks,rank,condition,best_condition,median_condition\n".to_owned();
     for p in &map.places {
@@ -66,7 +65,6 @@ pub fn map_csv(map: &ObservabilityMap) -> String {
 }
 
 /// A world's map of the condition, for a robot that faces as `facing` says.
-#[must_use]
 pub fn map_svg(world: &World, map: &ObservabilityMap, facing: &str) -> String {
     let log = |condition: f64| if condition.is_nan() { MOST_LOG } else { libm::log10(condition.clamp(1.0, 1e30)) };
     let cells = map.places.iter().map(|p| (Vector2::new(p.x_m, p.y_m), log(p.condition)));
@@ -77,7 +75,6 @@ pub fn map_svg(world: &World, map: &ObservabilityMap, facing: &str) -> String {
 }
 
 /// A world's map in numbers, for a terminal.
-#[must_use]
 pub fn summary(map: &ObservabilityMap, facing: &str) -> String {
     let [q10, q50, q90] = [0.1, 0.5, 0.9].map(|share| short(map.condition_quantile(share)));
     let full = map.places.iter().filter(|p| p.rank == 3).count();

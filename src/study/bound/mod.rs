@@ -125,7 +125,6 @@ impl PolarErrors {
     }
 
     /// R (m), theta and alpha (rad).
-    #[must_use]
     pub fn values(&self) -> [f64; 3] {
         [self.range_m, self.bearing_rad, self.heading_rad]
     }
@@ -139,7 +138,6 @@ impl PolarErrors {
     }
 
     /// By component, these over `other`.
-    #[must_use]
     pub fn over(&self, other: &Self) -> [f64; 3] {
         std::array::from_fn(|k| self.values()[k] / other.values()[k])
     }
@@ -186,26 +184,22 @@ impl BoundRow {
     }
 
     /// The filter's errors over the bound, for R, theta and alpha.
-    #[must_use]
     pub fn ratio(&self) -> Option<[f64; 3]> {
         Some(self.rmse?.over(&self.bound?))
     }
 
     /// 95 % interval in which the mean NEES of a consistent filter falls.
-    #[must_use]
     pub fn nees_band(&self) -> [f64; 2] {
         nees_band(self.runs)
     }
 
     /// 95 % interval in which the NIS a bearing of a consistent filter falls.
-    #[must_use]
     pub fn nis_band(&self) -> [f64; 2] {
         chi_square_95(self.bearings as f64).map(|bound| bound / self.bearings as f64)
     }
 }
 
 /// 95 % interval in which the mean NEES of a consistent filter falls over so many runs.
-#[must_use]
 pub fn nees_band(runs: usize) -> [f64; 2] {
     chi_square_95(3.0 * runs as f64).map(|bound| bound / runs as f64)
 }

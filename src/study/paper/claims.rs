@@ -30,7 +30,6 @@ pub struct Tally {
 pub type Both = [Tally; 2];
 
 /// Of runs under both laws.
-#[must_use]
 pub fn tally(runs: &[Run]) -> Both {
     LAWS.map(|law| {
         let runs = || runs.iter().filter(move |r| r.law == law);
@@ -41,7 +40,6 @@ pub fn tally(runs: &[Run]) -> Both {
 }
 
 /// Median over runs of an error: of R (0), theta (1), alpha (2). NaN without runs.
-#[must_use]
 pub fn median_rmse<'a>(runs: impl IntoIterator<Item = &'a Run>, state: usize) -> f64 {
     let errors: Vec<f64> = runs.into_iter().filter_map(|r| Some(r.track.rmse()?[state])).collect();
     quantile(&errors, 0.5).unwrap_or(f64::NAN)
@@ -72,7 +70,6 @@ pub const NOISE_SEEDS: u64 = 10;
 
 impl Claims {
     /// Both laws with this start, with the right Jacobian and with the printed one; `None` if it is none of the audit's.
-    #[must_use]
     pub fn started(&self, wanted: StartError) -> Option<&[Both; 2]> {
         self.starts.iter().find(|(start, _)| *start == wanted).map(|(_, both)| both)
     }

@@ -54,7 +54,6 @@ pub struct Entrant {
 
 impl Entrant {
     /// All, in the order of the table.
-    #[must_use]
     pub fn all() -> Vec<Self> {
         let filters = [
             (MethodKind::PaperEkf, Told::Start),
@@ -67,7 +66,6 @@ impl Entrant {
     }
 
     /// Whether it steers by a homing vector and estimates nothing.
-    #[must_use]
     pub fn is_vector(&self) -> bool {
         !matches!(self.method, MethodKind::PaperEkf | MethodKind::AnchoredEkf)
     }
@@ -117,7 +115,6 @@ pub struct Row {
 
 impl Row {
     /// From how many starts it came home.
-    #[must_use]
     pub fn home(&self) -> usize {
         self.times_s.iter().flatten().count()
     }
@@ -134,7 +131,6 @@ pub struct Contest {
 
 impl Contest {
     /// The row of a method that sees the paper's three objects.
-    #[must_use]
     pub fn row(&self, method: &MethodKind, law: Law, told: Told) -> Option<&Row> {
         let is = |e: &Entrant| e.method == *method && e.law == law && e.told == told;
         self.rows.iter().find(|row| is(&row.entrant) && row.objects == 3)

@@ -83,25 +83,21 @@ impl Default for Variant {
 
 impl Variant {
     /// That of Table II, for bearings from images: Q = 0.01 I, M = I, P0 = I.
-    #[must_use]
     pub fn of_images() -> Self {
         Self { settings: PaperSettings { measurement: 1.0, ..PaperSettings::default() }, ..Self::default() }
     }
 
     /// The same with the Jacobian of the prediction as it is printed.
-    #[must_use]
     pub fn printed(self) -> Self {
         Self { settings: PaperSettings { transition: Transition::Printed, ..self.settings }, ..self }
     }
 
     /// The same with the filter started elsewhere.
-    #[must_use]
     pub fn started(self, start: StartError) -> Self {
         Self { start, ..self }
     }
 
     /// What runs from a true start (home frame).
-    #[must_use]
     pub fn setup(&self, law: Law, truth: &Pose) -> Setup {
         let (pace, initial_estimate) = (Pace::Constant { beta: self.beta }, Some(self.start.apply(truth)));
         Setup { paper: self.settings, pace, initial_estimate, ..method(MethodKind::PaperEkf, law) }
@@ -141,7 +137,6 @@ impl StartError {
     pub const HALF_RIGHT_ANGLE: Self = Self::Heading(45.0 * std::f64::consts::PI / 180.0);
 
     /// The supposed start for a true one, both in the home frame.
-    #[must_use]
     pub fn apply(self, truth: &Pose) -> Pose {
         match self {
             Self::None => *truth,

@@ -41,13 +41,11 @@ impl Ideal {
     }
 
     /// The mean distance of the landmarks from home, m.
-    #[must_use]
     pub fn length_m(&self) -> f64 {
         mean(self.landmarks.iter().map(|l| l.norm())).unwrap_or_default()
     }
 
     /// Condition of the observability block over time (s) along a run.
-    #[must_use]
     pub fn conditions(&self, track: &Track) -> Vec<[f64; 2]> {
         let length_m = self.length_m();
         let condition = |truth| observability(truth, &self.landmarks, true, length_m).condition;

@@ -34,7 +34,6 @@ impl ImageSet {
     pub const ALL: [Self; 2] = [Self::Paper, Self::Vardy];
 
     /// The world that is rendered for it.
-    #[must_use]
     pub fn world_name(self) -> &'static str {
         match self {
             Self::Paper => "paper-grid",
@@ -43,7 +42,6 @@ impl ImageSet {
     }
 
     /// Its grid. Rows and columns count from 0 here; the paper's own set counts from 1.
-    #[must_use]
     pub fn grid(self) -> Grid {
         match self {
             Self::Paper => Grid { rows: 9, columns: 19, spacing_m: 0.2925, home: Place { i: 4, j: 9 } },

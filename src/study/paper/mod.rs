@@ -25,7 +25,6 @@ pub const LAWS: [Law; 2] = [Law::Proportional, Law::Lyapunov];
 pub const STARTS: [&str; 4] = ["P1", "P2", "P3", "P4"];
 
 /// What the paper calls a law.
-#[must_use]
 pub fn law_name(law: Law) -> &'static str {
     match law {
         Law::Proportional => "proportional",

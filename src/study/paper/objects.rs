@@ -110,7 +110,6 @@ impl ObjectField {
     }
 
     /// The home snapshot of the first `count` objects.
-    #[must_use]
     pub fn home(&self, count: usize, sd_rad: f64) -> HomeSnapshot {
         let bearing =
             |(k, object): (usize, &Object)| Bearing { id: LandmarkId(k as u32), azimuth_rad: object.home_rad, sd_rad };
@@ -119,7 +118,6 @@ impl ObjectField {
 
     /// Bearings of the first `count` objects from a pose in the home frame: interpolated linearly between the four places around
     /// it. An object that was not found at one of them is not seen.
-    #[must_use]
     pub fn bearings(&self, pose: &crate::geometry::Pose, count: usize, sd_rad: f64) -> Vec<Bearing> {
         let Some(cell) = self.grid.cell(pose.position()) else { return Vec::new() };
         let interpolate = |(k, object): (usize, &Object)| -> Option<Bearing> {
@@ -135,7 +133,6 @@ impl ObjectField {
     }
 
     /// The point in the plane that explains an object's azimuths best.
-    #[must_use]
     pub fn fix(&self, object: &Object) -> Option<Fix> {
         let sights: Vec<(Vector2<f64>, f64)> = self
             .grid

@@ -55,19 +55,16 @@ impl Track {
     }
 
     /// Time at which the robot came within Rc; `None` if it did not.
-    #[must_use]
     pub fn time_s(&self) -> Option<f64> {
         self.samples.last().filter(|_| self.home).map(|s| s.time_s)
     }
 
     /// True distance to home at the end, m.
-    #[must_use]
     pub fn final_distance_m(&self) -> f64 {
         self.samples.last().map_or(f64::NAN, |s| s.truth.position().norm())
     }
 
     /// Errors of the estimate by (17), over the instants after the start that have one.
-    #[must_use]
     pub fn rmse(&self) -> Option<Rmse> {
         let (mut sums, mut count) = ([0.0; 3], 0.0);
         for sample in self.samples.iter().skip(1) {
@@ -83,14 +80,12 @@ impl Track {
 }
 
 /// Time of the straight way from a start (home frame) to Rc, s: no method at this speed is faster.
-#[must_use]
 pub fn straight_s(start: &Pose, task: &TaskSpec) -> f64 {
     (start.position().norm() - task.arrival_radius_m) / task.speed_m_s
 }
 
 /// Ts, v, Rc and the time limit of the paper's runs stand in the task of `world`. Its robot is made one without limits of its own but for
 /// [`TURN_LIMIT_RAD_S`].
-#[must_use]
 pub fn unlimited(world: &World) -> World {
     let mut world = world.clone();
     let robot = &mut world.spec.robot;
@@ -101,7 +96,6 @@ pub fn unlimited(world: &World) -> World {
 
 /// A method under the paper's stop rule: homing vectors and the paper's filter at the paper's pace, the anchored filter at its own,
 /// which slows down to turn and stops when it is sure to be home. None of them is told where it starts.
-#[must_use]
 pub fn method(method: MethodKind, law: Law) -> Setup {
     let pace = Pace::Constant { beta: BETA };
     Setup { plant: PlantKind::Unicycle, method, law, pace, stop: StopRule::Reached, ..Setup::default() }

@@ -26,7 +26,6 @@ pub enum Design {
 /// The point `index` in [0, 1) on each of `axes` axes; designs of listed levels have none.
 ///
 /// Every point depends on the seed and its own index alone, so that a longer study begins with the points of a shorter one.
-#[must_use]
 pub fn point(design: Design, seed: Seed, index: u64, axes: usize) -> Vec<f64> {
     match design {
         Design::Grid | Design::OneAtATime => Vec::new(),

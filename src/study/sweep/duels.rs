@@ -23,7 +23,6 @@ pub struct Scale {
 
 impl Scale {
     /// That of an axis: its listed values, or classes of its range.
-    #[must_use]
     pub fn of(study: &Study, axis: usize) -> Self {
         let Axis { label, levels, .. } = &study.axes[axis];
         let levels = match levels {
@@ -39,7 +38,6 @@ impl Scale {
     }
 
     /// The level that a row belongs to; `None` where the axis is not set in it.
-    #[must_use]
     pub fn level(&self, study: &Study, row: &Row) -> Option<usize> {
         match &study.axes[self.axis].levels {
             Levels::Listed(values) => values.iter().position(|v| *v == row.values[self.axis]),
@@ -85,7 +83,6 @@ pub struct Duel {
 }
 
 /// Compares every two levels of the compared axis: all runs that differ in nothing else are a pair.
-#[must_use]
 pub fn duels(study: &Study, rows: &[Row]) -> Vec<Duel> {
     let Some(axis) = study.compared() else { return Vec::new() };
     let (scale, stride) = (Scale::of(study, axis), study.stride(axis));
@@ -124,7 +121,6 @@ impl Duel {
     }
 
     /// The pairs whose first one's cell (that of the compared axis' first level) `choose` takes.
-    #[must_use]
     pub fn within(&self, choose: impl Fn(u64) -> bool) -> Paired {
         let mut some = Paired::default();
         for &(cell, _, a, b) in &self.pairs {
@@ -138,7 +134,6 @@ impl Duel {
 
 /// Failures worth a look, at most `most`: of each level of the compared axis and each outcome the first ones, in turn, none of a
 /// cell where all runs end alike before those where they do not.
-#[must_use]
 pub fn failures<'a>(study: &Study, rows: &'a [Row], most: usize) -> Vec<&'a Row> {
     let scale = study.compared().map(|axis| Scale::of(study, axis));
     let mut home_in_cell: BTreeMap<u64, usize> = BTreeMap::new();

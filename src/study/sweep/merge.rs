@@ -19,20 +19,17 @@ const NOTES: [&str; 3] = ["study", "study_sha256", "version"];
 
 impl Identity {
     /// That of rows which this program makes.
-    #[must_use]
     pub fn of(study: &Study) -> Self {
         Self { study: study.name.clone(), sha256: study.sha256(), version: crate::VERSION.to_owned() }
     }
 
     /// As notes of a file.
-    #[must_use]
     pub fn notes(&self) -> [(&'static str, String); 3] {
         let [study, sha256, version] = NOTES;
         [(study, self.study.clone()), (sha256, self.sha256.clone()), (version, self.version.clone())]
     }
 
     /// From the notes of a file; `None` where it has none.
-    #[must_use]
     pub fn from_notes(notes: &[(String, String)]) -> Option<Self> {
         let [study, sha256, version] =
             NOTES.map(|name| notes.iter().find(|(key, _)| key == name).map(|(_, value)| value.clone()));
@@ -40,7 +37,6 @@ impl Identity {
     }
 
     /// Where the two differ, in words; `None` where they are the same.
-    #[must_use]
     pub fn difference(&self, other: &Self) -> Option<String> {
         let told = |what: &str, a: &str, b: &str| Some(format!("{what} {a}, not {b}"));
         if self.study != other.study {

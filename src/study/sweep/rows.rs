@@ -23,7 +23,6 @@ pub struct Row {
 
 impl Row {
     /// The row of an episode that ran.
-    #[must_use]
     pub fn of(episode: u64, cell: u64, values: &Arc<[Value]>, summary: &Summary) -> Self {
         Self { episode, cell, values: Arc::clone(values), run: summary.into() }
     }
@@ -31,7 +30,6 @@ impl Row {
 
 impl Study {
     /// Where a row lies in the study, in words.
-    #[must_use]
     pub fn place_in_words(&self, row: &Row) -> String {
         let set = self.axes.iter().zip(row.values.iter()).filter(|(_, value)| **value != Value::Unset);
         let words = set.map(|(axis, value)| format!("{} {value}", axis.label));
@@ -71,7 +69,6 @@ const INTS: [(&str, Field<i64>); 3] =
     [("collisions", |r| &mut r.collisions), ("home_landmarks", |r| &mut r.home_landmarks), ("steps", |r| &mut r.steps)];
 
 /// The rows as a table: where they belong, the axes' values, how they ended, and in numbers.
-#[must_use]
 pub fn table(study: &Study, rows: &[Row]) -> Table {
     let mut table = Table::default()
         .ints("episode", rows.iter().map(|r| r.episode as i64))
@@ -156,7 +153,6 @@ pub fn from_table(study: &Study, table: &Table) -> Result<Vec<Row>, String> {
 }
 
 /// The row of an episode that has no result, and why.
-#[must_use]
 pub fn without_result(episode: u64, (cell, seed): (u64, u64), values: &Arc<[Value]>, outcome: Ending, reason: String) -> Row {
     Row { episode, cell, values: Arc::clone(values), run: RunRow { seed, outcome, reason, ..RunRow::default() } }
 }

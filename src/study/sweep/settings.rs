@@ -245,7 +245,6 @@ const UNITS: [(&str, &str); 14] = [
 ];
 
 /// All settings.
-#[must_use]
 pub fn catalogue() -> Vec<Setting> {
     let own =
         SETTINGS.iter().map(|(key, default, meaning, _)| Setting::new((*key).into(), (*default).into(), (*meaning).into()));

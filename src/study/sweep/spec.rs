@@ -60,7 +60,6 @@ pub enum Levels {
 
 impl Levels {
     /// The listed ones; none where any value may come.
-    #[must_use]
     pub fn listed(&self) -> &[Value] {
         if let Self::Listed(values) = self { values } else { &[] }
     }
@@ -150,7 +149,6 @@ impl Study {
     }
 
     /// Names of the built-in studies.
-    #[must_use]
     pub fn builtin_names() -> Vec<&'static str> {
         BUILTIN.iter().map(|(name, _)| *name).collect()
     }
@@ -168,7 +166,6 @@ impl Study {
 
     /// Names the study and everything that decides about its rows, this program's version included: rows of studies with equal
     /// hashes belong together.
-    #[must_use]
     pub fn sha256(&self) -> String {
         let text = serde_json::to_string(self).unwrap_or_default();
         let hash = Sha256::digest(format!("wayhome {}\n{text}", crate::VERSION));
@@ -194,7 +191,6 @@ impl Study {
     }
 
     /// The axis whose levels are compared; `None` where the study has no such axis, or it has one level.
-    #[must_use]
     pub fn compared(&self) -> Option<usize> {
         self.axes.iter().position(|axis| axis.setting == self.compare && axis.levels.listed().len() > 1)
     }
@@ -206,7 +202,6 @@ impl Study {
 
     /// How many cells of a point lie between two that differ by one level of an axis alone. In a one-at-a-time design only the compared
     /// axis has such pairs.
-    #[must_use]
     pub fn stride(&self, axis: usize) -> u64 {
         match self.design {
             Design::OneAtATime => 1,
@@ -229,31 +224,26 @@ impl Study {
     }
 
     /// Number of cells.
-    #[must_use]
     pub fn cells(&self) -> u64 {
         self.points * self.combinations()
     }
 
     /// Episodes of a cell.
-    #[must_use]
     pub fn episodes_per_cell(&self) -> u64 {
         self.seeds.end() - self.seeds.start() + 1
     }
 
     /// Number of episodes.
-    #[must_use]
     pub fn episodes(&self) -> u64 {
         self.cells() * self.episodes_per_cell()
     }
 
     /// Number of chunks.
-    #[must_use]
     pub fn chunks(&self) -> u64 {
         self.cells() * self.episodes_per_cell().div_ceil(CHUNK_EPISODES)
     }
 
     /// The chunk of a number below [`Study::chunks`].
-    #[must_use]
     pub fn chunk(&self, index: u64) -> Chunk {
         let (per_cell, episodes) = (self.episodes_per_cell().div_ceil(CHUNK_EPISODES), self.episodes_per_cell());
         let (cell, before) = (index / per_cell, index % per_cell * CHUNK_EPISODES);
@@ -262,21 +252,18 @@ impl Study {
     }
 
     /// Number of the chunk that an episode is in.
-    #[must_use]
     pub fn chunk_of(&self, episode: u64) -> u64 {
         let per_cell = self.episodes_per_cell();
         episode / per_cell * per_cell.div_ceil(CHUNK_EPISODES) + episode % per_cell / CHUNK_EPISODES
     }
 
     /// Cell and seed of an episode.
-    #[must_use]
     pub fn place(&self, episode: u64) -> (u64, u64) {
         (episode / self.episodes_per_cell(), self.seeds.start() + episode % self.episodes_per_cell())
     }
 
     /// The axes' values in a cell. The last axis changes fastest, the point slowest; in a one-at-a-time design the compared axis
     /// changes fastest, and all but it and the one whose turn it is are [`Value::Unset`].
-    #[must_use]
     pub fn values(&self, cell: u64) -> Vec<Value> {
         if self.design == Design::OneAtATime {
             return self.values_in_turn(cell);
@@ -322,7 +309,6 @@ impl Study {
     }
 
     /// Whether each seed has a world of its own: a `world` such as `office:seed`.
-    #[must_use]
     pub fn draws_worlds(&self) -> bool {
         let drawn = |value: &Value| matches!(value, Value::Text(text) if settings::is_drawn(text));
         let set = self.settings.iter().any(|(name, value)| name == "world" && drawn(value));

@@ -137,19 +137,16 @@ impl StudyFolder {
     }
 
     /// The study.
-    #[must_use]
     pub fn study(&self) -> &Study {
         &self.study
     }
 
     /// Where the study was read from.
-    #[must_use]
     pub fn source(&self) -> &Path {
         &self.source
     }
 
     /// Where it is.
-    #[must_use]
     pub fn path(&self) -> &Path {
         &self.path
     }

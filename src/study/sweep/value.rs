@@ -43,7 +43,6 @@ impl Value {
     }
 
     /// The number, whole or not.
-    #[must_use]
     pub fn number(&self) -> Option<f64> {
         match self {
             Self::Whole(n) => Some(*n as f64),
@@ -53,7 +52,6 @@ impl Value {
     }
 
     /// The text.
-    #[must_use]
     pub fn text(&self) -> Option<&str> {
         if let Self::Text(text) = self { Some(text) } else { None }
     }

@@ -58,19 +58,16 @@ pub struct SetRates {
 
 impl SetRates {
     /// Greatest share of the slower stage that is possible where both share all threads: the inverse of the sum of their times.
-    #[must_use]
     pub fn bound_of_slower(&self) -> f64 {
         1.0 / (1.0 / self.render_per_s + 1.0 / self.encode_per_s) / self.render_per_s.min(self.encode_per_s)
     }
 
     /// Share of the slower stage alone with all threads to itself.
-    #[must_use]
     pub fn share_of_slower(&self) -> f64 {
         self.pipeline_per_s / self.render_per_s.min(self.encode_per_s)
     }
 
     /// Share of the slower stage on one thread.
-    #[must_use]
     pub fn share_of_slower_one(&self) -> f64 {
         self.pipeline_per_s / self.render_one_per_s.min(self.encode_one_per_s)
     }

@@ -68,7 +68,6 @@ fn page(found: &DatasetSpeeds) -> String {
 }
 
 /// The rates, for a terminal.
-#[must_use]
 pub fn text(found: &DatasetSpeeds) -> String {
     let mut text = String::new();
     for r in &found.rates {

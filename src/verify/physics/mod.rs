@@ -59,7 +59,6 @@ pub struct ClosedForm {
 
 impl ClosedForm {
     /// Greatest relative difference between a point and the equation.
-    #[must_use]
     pub fn greatest_difference(&self) -> f64 {
         greatest_difference(&self.curves)
     }

@@ -58,7 +58,6 @@ pub fn write(mut folder: OutputFolder, found: &Validation) -> Result<()> {
 }
 
 /// The greatest differences, for a terminal.
-#[must_use]
 pub fn text(found: &Validation) -> String {
     let line = |form: &ClosedForm| {
         let (difference, allowed) = (100.0 * form.greatest_difference(), 100.0 * form.tolerance);

@@ -142,7 +142,6 @@ pub struct RenderSpeeds {
 
 impl RenderSpeeds {
     /// How many times as fast two threads are as one, in batches on the widest instruction set, size by size.
-    #[must_use]
     pub fn speedups(&self) -> Vec<((u32, u32), f64)> {
         let rate = |size: (u32, u32), threads: usize| {
             let of_size = self.speeds.iter().filter(|s| (s.width, s.height) == size && s.what.ends_with("batch"));

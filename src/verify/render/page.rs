@@ -95,7 +95,6 @@ pub fn write(mut folder: OutputFolder, found: &RenderSpeeds, sheets: &[(String, 
 }
 
 /// One line a figure, for a terminal.
-#[must_use]
 pub fn text(found: &RenderSpeeds) -> String {
     let mut text = header() + "\n";
     for speed in &found.speeds {
@@ -116,7 +115,6 @@ fn header() -> String {
 }
 
 /// A figure as a line.
-#[must_use]
 pub fn line(speed: &Throughput) -> String {
     format!(
         "{:20} {:>10} {:>7} {:>12.0} {:>12.0} {:>13.1} %",

@@ -33,13 +33,11 @@ pub enum Factor {
 
 impl Factor {
     /// Name in files.
-    #[must_use]
     pub fn name(self) -> &'static str {
         self.into()
     }
 
     /// The levels that are measured. Presets are counted in their order, the home panorama's first.
-    #[must_use]
     pub fn levels(self) -> &'static [f64] {
         match self {
             Self::Distance => &[0.25, 0.5, 1.0, 2.0, 3.0],
@@ -53,7 +51,6 @@ impl Factor {
     }
 
     /// What a level is called: the preset's name or the number.
-    #[must_use]
     pub fn label(self, level: f64) -> String {
         let condition = Condition::at(self, level);
         match self {
@@ -87,7 +84,6 @@ impl Condition {
         Self { gain: 1.0, gamma: 1.0, noise: 0.0, occlusion: 0.0, light: LightPreset::Day, camera: CameraPreset::Ideal };
 
     /// The condition at a level of a factor.
-    #[must_use]
     pub fn at(factor: Factor, level: f64) -> Self {
         match factor {
             Factor::Distance | Factor::Rotation => Self::CLEAR,

@@ -130,7 +130,6 @@ pub struct VisionSettings {
 
 impl VisionSettings {
     /// Number of levels that are measured in each world.
-    #[must_use]
     pub fn levels(&self) -> usize {
         self.factors.iter().map(|factor| factor.levels().len()).sum()
     }

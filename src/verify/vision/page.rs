@@ -234,7 +234,6 @@ fn errors(study: &VisionStudy) -> Chart {
 }
 
 /// The study for a terminal.
-#[must_use]
 pub fn text(study: &VisionStudy) -> String {
     let mut text = format!(
         "{:10} {:9} {:>8} {:>5} {:>7} {:>7} {:>7} {:>7} {:>8} {:>8} {:>7} {:>7}\n",

@@ -131,13 +131,11 @@ impl Score {
     }
 
     /// Share of right matches; 1 where there is none.
-    #[must_use]
     pub fn precision(&self) -> f64 {
         if self.matches == 0 { 1.0 } else { self.right as f64 / self.matches as f64 }
     }
 
     /// Share of the visible home features that were found.
-    #[must_use]
     pub fn repeatability(&self) -> f64 {
         self.repeated as f64 / self.visible.max(1) as f64
     }
@@ -162,7 +160,6 @@ pub struct Spread {
 
 impl Spread {
     /// Quantiles of `values`; `None` of no values.
-    #[must_use]
     pub fn of(values: &[f64]) -> Option<Self> {
         let mut sorted = values.to_vec();
         sorted.sort_by(f64::total_cmp);
@@ -171,7 +168,6 @@ impl Spread {
     }
 
     /// The same in another unit.
-    #[must_use]
     pub fn times(self, factor: f64) -> Self {
         Self { median: factor * self.median, q68: factor * self.q68, q95: factor * self.q95 }
     }
