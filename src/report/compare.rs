@@ -1,7 +1,5 @@
 //! The files of a comparison: a table for people, one for programs, a bar chart, and a map for each contender.
 
-use std::fmt::Write;
-
 use svg::node::element::Group;
 
 use super::curves::document;
@@ -109,45 +107,38 @@ pub fn table(comparison: &Comparison) -> String {
 /// The comparison as Markdown.
 pub fn readme(comparison: &Comparison, command: &str, maps: &[String]) -> String {
     let c = comparison;
-    let [first, last] = c.seeds;
-    let mut text = format!(
-        "# Methods compared in `{}`\n\nMade by\n\n```sh\n{command}\n```\n\nwith wayhome {} (world file SHA-256 `{}`).\n\n![Share of runs that come \
-         home](compare.svg)\n\nAll contenders run on `{}` with `{}` bearings from the same random starts (seeds {first} to {last}), at {} m/s, for \
-         {} s at most. *Home* claimed to be home and came to rest within {:.0} cm of it; *wrong claims* claimed it and came to rest farther off. *Time ratio* is time \
-         over straight-line time and *path ratio* path over straight distance, medians of the runs that came home; *final* is the median \
-         distance from home at the end of all runs. A homing vector says nothing of the distance: methods that steer by one slow down as it \
-         shortens, hence their time ratio. ",
-        c.world,
-        c.version,
-        c.world_sha256,
-        c.plant,
-        c.bearings,
-        c.speed_m_s,
-        c.time_limit_s,
-        100.0 * c.arrival_radius_m,
-    );
-    if let Some(spacing) = c.grid_spacing_m {
-        let _ = write!(
-            text,
+    let grid = |spacing: f64| {
+        format!(
             "*AAE* is the mean angle between homing vector and direction of home over a grid of {} starts {spacing:.2} m apart, and *catchment* \
              the share of them from which it comes home, all with a heading of {:.0} degrees.",
             c.standings.first().map_or(0, |s| s.grid.len()),
             c.grid_heading_rad.to_degrees()
-        );
-    }
-    let _ = write!(text, "\n\n{}", table_of_numbers(&HEAD.join(" | "), 2, c.standings.iter().map(cells)));
-    for contender in c.standings.iter().map(|s| &s.contender) {
-        if let MethodKind::Exec(program) = &contender.method {
-            let _ = write!(text, "\n`{}` is the program `{program}`.\n", contender.key);
-        }
-    }
-    if !maps.is_empty() {
-        text += "\n## Where from\n\nGreen: came home from there. Red: did not. Arrows: the homing vector at standstill.\n";
-    }
-    for map in maps {
-        let _ = write!(text, "\n![{map}]({map})\n");
-    }
-    text
+        )
+    };
+    let program = |contender: &Contender| match &contender.method {
+        MethodKind::Exec(program) => format!("\n`{}` is the program `{program}`.\n", contender.key),
+        _ => String::new(),
+    };
+    let from = "\n## Where from\n\nGreen: came home from there. Red: did not. Arrows: the homing vector at standstill.\n";
+    let from = if maps.is_empty() { "" } else { from };
+    format!(
+        include_str!("compare.md"),
+        command = command,
+        world = c.world,
+        version = c.version,
+        sha = c.world_sha256,
+        first = c.seeds[0],
+        last = c.seeds[1],
+        plant = c.plant,
+        bearings = c.bearings,
+        speed = c.speed_m_s,
+        limit = c.time_limit_s,
+        radius = 100.0 * c.arrival_radius_m,
+        grid = c.grid_spacing_m.map_or_else(String::new, grid),
+        table = table_of_numbers(&HEAD.join(" | "), 2, c.standings.iter().map(cells)),
+        programs = c.standings.iter().map(|s| program(&s.contender)).collect::<String>(),
+        maps = [from.to_owned()].into_iter().chain(maps.iter().map(|map| format!("\n![{map}]({map})\n"))).collect::<String>(),
+    )
 }
 
 /// Colour of starts from which a contender came home, and of others.

@@ -1,7 +1,5 @@
 //! The files of a robustness study: a table for people, one for programs, and a picture.
 
-use std::fmt::Write;
-
 use strum::VariantArray;
 use svg::node::element::Group;
 
@@ -79,15 +77,19 @@ fn by_axis(study: &Robustness) -> Vec<(Axis, Vec<&Cell>)> {
 
 /// The study as Markdown.
 pub fn readme(study: &Robustness, command: &str) -> String {
-    let [first, last] = study.seeds;
     let setup = &study.setup;
-    let mut text = format!(
-        "# Robustness in `{world}`\n\nMade by\n\n```sh\n{command}\n```\n\nwith wayhome {version} (world file SHA-256 `{sha}`).\n\n\
-         ![Share of runs that come home](robustness.svg)\n\n\
-         Each row is seeds {first} to {last} of `{plant}` x `{bearings}` x `{method}` with the `{law}` law{renderer}: random \
-         starts, nothing known, one condition changed and all others left as the world has them. *Home* is the share of runs that \
-         claimed to be home and came to rest within {radius:.0} cm of it, with its 95 % Wilson interval. *Wrong claims* claimed it \
-         and came to rest farther off. *Time ratio* is time over straight-line time, of the runs that came home.\n",
+    let section = |(axis, cells): (Axis, Vec<&Cell>)| {
+        let (title, explanation) = explained(axis);
+        let head = format!(
+            "{title} | home | 95 % | wrong claims | timeout, lost, stuck | time ratio, median | 90 % | final distance, median"
+        );
+        format!("\n## {title}\n\n{explanation}\n\n{}", table_of_numbers(&head, 0, cells.into_iter().map(markdown_row)))
+    };
+    format!(
+        include_str!("robustness.md"),
+        command = command,
+        first = study.seeds[0],
+        last = study.seeds[1],
         world = study.world,
         version = study.version,
         sha = study.world_sha256,
@@ -97,16 +99,8 @@ pub fn readme(study: &Robustness, command: &str) -> String {
         law = setup.controller,
         renderer = study.renderer.as_ref().map_or_else(String::new, |kind| format!(", rendered by the {kind} renderer")),
         radius = 100.0 * setup.arrival_radius_m,
-    );
-    for (axis, cells) in by_axis(study) {
-        let (title, explanation) = explained(axis);
-        let head = format!(
-            "{title} | home | 95 % | wrong claims | timeout, lost, stuck | time ratio, median | 90 % | final distance, median"
-        );
-        let table = table_of_numbers(&head, 0, cells.into_iter().map(markdown_row));
-        let _ = write!(text, "\n## {title}\n\n{explanation}\n\n{table}");
-    }
-    text
+        axes = by_axis(study).into_iter().map(section).collect::<String>(),
+    )
 }
 
 fn markdown_row(cell: &Cell) -> [String; 8] {

@@ -9,35 +9,7 @@ use crate::study::sweep::store::Rate;
 use crate::study::sweep::{Design, Exhibit};
 use crate::study::tally::{OutcomeCounts, Tally};
 
-const STYLE: &str = "
-:root{color-scheme:light}
-*{box-sizing:border-box}
-body{margin:0;font:16px/1.5 system-ui,-apple-system,'Segoe UI',Roboto,Helvetica,Arial,sans-serif;color:#1a1a1a;background:#f6f5f2}
-main{max-width:1180px;margin:0 auto;padding:24px 16px 64px}
-h1{font-size:1.7rem;line-height:1.2;margin:.2em 0 .1em}
-h2{font-size:1.25rem;margin:2em 0 .3em}
-p{max-width:46em;margin:.4em 0 1em}
-.faint{color:#5c5a55}
-.figures{display:grid;grid-template-columns:repeat(auto-fill,minmax(min(100%,330px),1fr));gap:14px;margin:14px 0}
-.pairwise{max-width:960px;grid-template-columns:repeat(auto-fill,minmax(min(100%,440px),1fr))}
-figure{margin:0;background:#fff;border:1px solid #e2e0da;border-radius:8px;padding:8px;min-width:0}
-figure svg,figure img{display:block;width:100%;height:auto}
-figure img+img{margin-top:6px}
-figcaption{font-size:.85rem;padding:6px 4px 2px;overflow-wrap:anywhere}
-.numbers{display:grid;grid-template-columns:repeat(auto-fit,minmax(130px,1fr));gap:10px;margin:16px 0}
-.numbers div{background:#fff;border:1px solid #e2e0da;border-radius:8px;padding:10px 12px}
-.numbers b{display:block;font-size:1.35rem;line-height:1.25}
-.numbers span{font-size:.82rem;color:#5c5a55}
-.scroll{overflow-x:auto;background:#fff;border:1px solid #e2e0da;border-radius:8px;margin:14px 0}
-table{border-collapse:collapse;width:100%;font-size:.88rem;font-variant-numeric:tabular-nums}
-th,td{padding:6px 10px;text-align:right;white-space:nowrap;border-bottom:1px solid #eceae5}
-th{background:#faf9f7;font-weight:600;white-space:normal;vertical-align:bottom;line-height:1.25}
-th:first-child,td:first-child,.words td,.words th{text-align:left}
-.words td+td{white-space:normal;overflow-wrap:anywhere}
-tr:last-child td{border-bottom:0}
-pre{margin:0;padding:12px;font-size:.82rem;line-height:1.45}
-code{font-family:ui-monospace,SFMono-Regular,Menlo,Consolas,monospace;font-size:.92em}
-";
+const STYLE: &str = include_str!("page.css");
 
 /// What the page shows.
 pub(super) struct Page<'a> {

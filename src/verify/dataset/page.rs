@@ -47,23 +47,16 @@ fn page(found: &DatasetSpeeds) -> String {
         .iter()
         .map(|c| [c.channel.to_owned(), c.coding.clone(), format!("{:.2}", c.ms), format!("{:.3}", c.share)]);
     let codings = table("channel | coding | ms | length", codings);
-    let frames = found.rates.first().map_or(0, |r| r.frames);
-    let [width, height] = found.codings_px;
     format!(
-        "# Making data sets\n\nMade by `wayhome verify dataset --out results/dataset` with wayhome {}. Processor: {}. World: `{}`.\n\n## The whole way to \
-         disk\n\nColours, range and instances as PNG, truth, sums; CPU renderer; random poses; medians of rounds of {frames} panoramas \
-         that take turns. Panoramas a second:\n\n{rates}\n\
-         Rendering and encoding both keep every processor busy, so that together they cannot be as fast as the slower of them with all \
-         processors to itself: \"most that is possible\" is the inverse of the sum of their times. The last column holds the whole \
-         against the slower of the two with one thread each, which is what a pipeline of one thread a stage comes to at best. `folder` is \
-         a file for each picture and for its truth, which costs the operating system time; `webdataset` puts them into archives.\n\n\
-         ## Codings\n\nOne thread, panoramas of {width} x {height}. Length is that of the file over that of the pixels. In use: fdeflate \
-         with Paeth's filter for colours and range, with the row above for instances.\n\n{codings}\n\
-         mtpng is not in the table: it spreads one picture over threads, which are all busy with a picture each here, and compresses by \
-         zlib's levels, whose fastest is.\n",
-        crate::VERSION,
-        found.processor,
-        found.world,
+        include_str!("page.md"),
+        rates = rates,
+        codings = codings,
+        width = found.codings_px[0],
+        height = found.codings_px[1],
+        frames = found.rates.first().map_or(0, |r| r.frames),
+        version = crate::VERSION,
+        processor = found.processor,
+        world = found.world,
     )
 }
 

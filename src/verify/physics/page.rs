@@ -1,7 +1,5 @@
 //! The page on the physics: a chart for each closed form, the slip map, and the comparison with another engine.
 
-use std::fmt::Write;
-
 use super::{ClosedForm, SlipMap, Validation};
 use crate::draw::chart::{Axis, Chart, HeatMap, Mark, Ramp, Stroke};
 use crate::draw::markdown::table;
@@ -210,13 +208,6 @@ fn percent(share: f64) -> String {
 }
 
 fn page(found: &Validation, drives: Option<&[Drive]>, speeds: Option<&[(String, f64)]>) -> String {
-    let mut text = format!(
-        "# The physics against its closed forms\n\n\
-        Made by `wayhome verify physics --out results/physics` with wayhome {}. Lines are equations, points are the plant of the\n\
-        program at its substep of 1 ms. The same equations are tests in `tests/physics.rs` and `tests/physics_settings.rs`. Robot:\n\
-        an iRobot Create 3 with equal wheels and, where the equation asks for it, its weight on the two wheels alone.\n\n",
-        crate::VERSION
-    );
     let rises = found.energy.iter().flat_map(|(_, curve)| curve.windows(2)).filter(|w| w[1][1] > w[0][1] * (1.0 + 1e-14));
     let energy = ["[Energy](#energy)".into(), "never rises".into(), format!("{} rises", rises.count()), "none".into()];
     let rows = found.closed_forms.iter().map(|form| {
@@ -224,50 +215,15 @@ fn page(found: &Validation, drives: Option<&[Drive]>, speeds: Option<&[(String, 
         let allowed = format!("{} %", 100.0 * form.tolerance);
         [title, format!("`{}`", form.equation), percent(form.greatest_difference()), allowed]
     });
-    text += &table("what | equation | greatest difference | allowed by the tests", rows.chain([energy]));
-    text.push('\n');
-    for form in &found.closed_forms {
-        let _ = write!(
-            text,
-            "<a id=\"{}\"></a>\n## {}\n\n`{}`. {}\n\n![{}]({}.svg)\n\n",
-            form.name, form.title, form.equation, form.story, form.title, form.name
-        );
-    }
-    text += "<a id=\"energy\"></a>\n## Energy\n\nA robot thrown across the floor with wheels that spin the wrong way and no torque on them: friction takes energy from\n\
-             body and wheels, and never gives any.\n\n![Energy](energy.svg)\n\n\
-             ## Substep\n\nThe end of a tour of 5.5 s against that at a 64th of a millisecond. The error falls with the substep, as the implicit\n\
-             first-order scheme promises; the program uses 1 ms.\n\n![Convergence](convergence.svg)\n\n\
-             ## Slip map\n\nGreatest distance between the paths of odometry and truth on a tour of two legs of 3 s at up to 0.3 m/s with full stops and\n\
-             a turn on the spot between them. Wheels are perfectly calibrated and encoders fine, so all of it is slip. Above the\n\
-             dashed line a = mu g the wheels must spin and skid, by v^2/2 (1/(mu g) - 1/a) on a straight leg; below it only creep\n\
-             is left, which grows as the acceleration nears the limit.\n\n![Slip map](slip-map.svg)\n";
-    if let Some(drives) = drives {
-        let _ = write!(
-            text,
-            "\n## The same drives in MuJoCo\n\n{OUTSIDE_STORY}\n\n{}\n![MuJoCo](mujoco.svg)\n",
-            drives_table(drives)
-        );
-    }
-    if let Some(speeds) = speeds {
-        let _ = write!(text, "\n## Speed\n\n{SPEED_STORY}\n\n{}", speed_table(speeds));
-    }
-    text
+    let form = |ClosedForm { name, title, equation, story, .. }: &ClosedForm| {
+        format!("<a id=\"{name}\"></a>\n## {title}\n\n`{equation}`. {story}\n\n![{title}]({name}.svg)\n\n")
+    };
+    format!(
+        include_str!("page.md"),
+        version = crate::VERSION,
+        table = table("what | equation | greatest difference | allowed by the tests", rows.chain([energy])),
+        forms = found.closed_forms.iter().map(form).collect::<String>(),
+        mujoco = drives.map_or_else(String::new, |drives| format!(include_str!("mujoco.md"), table = drives_table(drives))),
+        speed = speeds.map_or_else(String::new, |speeds| format!(include_str!("speed.md"), table = speed_table(speeds))),
+    )
 }
-
-/// What the benchmark does.
-const SPEED_STORY: &str = "`cargo bench --bench physics`, then `tests/outside/physics_speed.py`: a robot with 4 walls, 10 standing and 5 moving bodies\n\
-    around it, in substeps of 1 ms, by the core's own time (median). Rapier runs only where something can be pushed. Its share of\n\
-    a push is what the same scene takes in rapier alone; `rapier/in every substep` is the open floor with rapier asked each\n\
-    time, as it would be without a look around first. The machine is shared, and its numbers vary by a factor of two with its\n\
-    other load.";
-
-/// What `tests/outside/mujoco_planar.py` does, and why the paths differ.
-const OUTSIDE_STORY: &str = "`tests/outside/mujoco_planar.py` drives the same Create 3 (equal wheels, no rolling resistance) through the same commands in\n\
-    MuJoCo 4.0: a body with six degrees of freedom on two rolling spheres and a sliding one, elliptic friction cones, Newton\n\
-    solver, a quarter of a millisecond a step. Motors and speed loop are the same equations, written twice; the contact is\n\
-    MuJoCo's own. Friction is 0.75 (dry) and 0.04 (ice), where the commanded 0.9 m/s^2 are more than twice what the floor gives.\n\n\
-    - MuJoCo's wheels grip almost without creep, ours creep by up to 1 cm/s at the friction limit, as rubber does. That is nearly\n\
-      all of the difference on the dry floor: with a creep of 0.5 mm/s (right half of the table) a fraction of a millimetre is left.\n\
-    - What is left on ice, 4 mm after a skid through two curves, is where the two solvers divide friction between the contacts\n\
-      while everything slides: MuJoCo regularises it by `impratio`, here 100; with 1000 and steps of 0.1 ms it is 3.2 mm.\n\
-    - Starting and stopping on ice, where the whole drive is a skid, agrees to a tenth of a millimetre.";

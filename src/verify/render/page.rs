@@ -10,7 +10,7 @@ use crate::error::Result;
 use crate::geometry::Twist;
 use crate::panorama::Panorama;
 use crate::random::Seed;
-use crate::render::{Camera, CpuRenderer, Scene, View};
+use crate::render::{Camera, CpuRenderer, RendererInfo, Scene, View};
 use crate::storage::{OutputFolder, json};
 use crate::world::{CameraPreset, LightPreset, World};
 
@@ -128,21 +128,6 @@ pub fn line(speed: &Throughput) -> String {
 }
 
 fn page(found: &RenderSpeeds) -> String {
-    let mut text = format!(
-        "# The renderer\n\n\
-        Made by `wayhome verify render --out results/rendering` with wayhome {}.\n\n\
-        ## Speed\n\n\
-        A round hall of 40 textured walls with 20 discs, floor and ceiling; colours, range and instance of every pixel; prefiltered\n\
-        textures, no noise. Four bytes of colour a pixel are counted, six of range and instance come on top. The limit is to fill\n\
-        256 MiB with one thread by the system's memset; it is timed again between any two of the runs whose median is shown. On\n\
-        processors with large caches that is not all they can do: stores past the caches may be twice as fast.\n\
-        `wayhome render --bench` prints the table of the machine at hand.\n\n",
-        crate::VERSION
-    );
-    let _ = writeln!(text, "Processor: {}.", found.processor);
-    if let Some(gpu) = &found.gpu {
-        let _ = writeln!(text, "Graphics adapter: {}, {}.", gpu.adapter, gpu.driver);
-    }
     let speeds = found.speeds.iter().map(|s| {
         [
             s.what.clone(),
@@ -153,25 +138,24 @@ fn page(found: &RenderSpeeds) -> String {
             format!("{:.1} %", 100.0 * s.share),
         ]
     });
-    text.push('\n');
-    text += &table("| size | threads | panoramas a second | colours, MB/s | share of the limit", speeds);
-    text += "\nTwo threads, each with its own pictures, against one: ";
-    let times: Vec<String> =
-        found.speedups().iter().map(|((width, height), times)| format!("{times:.2} times at {width} x {height}")).collect();
-    let (width, height) = found.bodies_size;
-    let _ = writeln!(text, "{}.\n\nThe cost of bodies at {width} x {height}, one thread:\n", times.join(", "));
+    let times = found.speedups().into_iter().map(|((width, height), times)| format!("{times:.2} times at {width} x {height}"));
     let costs = found.bodies.iter().map(|cost| [cost.bodies.to_string(), format!("{:.0}", 1e6 * cost.panorama_s)]);
-    text += &table("bodies | a panorama, \u{b5}s", costs);
-    text += "\n## Light\n\nThe built-in world `gallery` by ";
-    text += &names(&LightPreset::ALL);
-    text += ".\n\n![Light](light.png)\n\n## Cameras\n\nThe same in motion, 0.2 m/s and 1.5 rad/s, by ";
-    text += &names(&CameraPreset::ALL);
-    text += ".\n\n![Cameras](camera.png)\n\n## Worlds\n\nFrom home and two places where a run may start: colours, range from near (light) to far \
-             (dark), instances.\n";
-    for name in World::builtin_names() {
-        let _ = write!(text, "\n### {name}\n\n![{name}]({name}.png)\n");
-    }
-    text
+    let adapter = |gpu: &RendererInfo| format!("Graphics adapter: {}, {}.\n", gpu.adapter, gpu.driver);
+    let world = |name: &str| format!("\n### {name}\n\n![{name}]({name}.png)\n");
+    format!(
+        include_str!("page.md"),
+        version = crate::VERSION,
+        processor = found.processor,
+        adapter = found.gpu.as_ref().map_or_else(String::new, adapter),
+        speeds = table("| size | threads | panoramas a second | colours, MB/s | share of the limit", speeds),
+        times = times.collect::<Vec<_>>().join(", "),
+        width = found.bodies_size.0,
+        height = found.bodies_size.1,
+        costs = table("bodies | a panorama, \u{b5}s", costs),
+        lights = names(&LightPreset::ALL),
+        cameras = names(&CameraPreset::ALL),
+        worlds = World::builtin_names().into_iter().map(world).collect::<String>(),
+    )
 }
 
 /// What files call some presets, in a row.

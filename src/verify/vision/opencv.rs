@@ -92,14 +92,6 @@ impl Detections {
                 rows.push(row);
             }
         }
-        format!(
-            "## Beside OpenCV\n\n![Right matches by method](opencv.svg)\n\nThe same pairs through OpenCV's detectors \
-             ([`opencv.csv`](opencv.csv), made by `tests/outside/opencv_features.py` with `opencv-python-headless`), scored by the same \
-             rule: ratio test at 0.8, mutual nearest neighbours, the strip padded cyclically, one thread. OpenCV has no geometric check \
-             here; wayhome's is part of it. Cells are right matches a panorama and, in brackets, precision. Times are those of one \
-             machine under load, medians: processor time for OpenCV, the clock for wayhome, which has its matching in the first \
-             number.\n\n{}\n",
-            table(&columns, rows)
-        )
+        format!(include_str!("opencv.md"), table = table(&columns, rows))
     }
 }

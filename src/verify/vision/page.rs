@@ -265,33 +265,26 @@ pub fn text(study: &VisionStudy) -> String {
 /// The study as Markdown.
 fn page(study: &VisionStudy, command: &str, figures: &[Figure], detections: Option<&Detections>) -> String {
     let worlds: Vec<String> = study.worlds.iter().map(|(name, sha)| format!("`{name}` (SHA-256 `{}`)", &sha[..12])).collect();
-    let [width, height] = study.size_px;
-    let mut text = format!(
-        "# The extractor against ground truth\n\nMade by\n\n```sh\n{command}\n```\n\nwith wayhome {version}, worlds {worlds}, \
-         {width} x {height} pixels, the {keypoints} strongest features of each panorama.\n\n\
-         Panoramas are taken in 16 directions around home, wherever the robot can stand there, each turned differently; \
-         the renderer's range says where each home feature must appear in them, and whether anything hides it. \
-         A match is *right* within {RIGHT_PX} pixels of that place. *Repeatability*: of the home features that can be seen, how many \
-         are found as features at all, within {RIGHT_PX} pixels and a factor 1.5 of the scale, matched or not. Matches are those that \
-         pass the geometric check. *Error* is that of the bearings of right matches; in stated standard deviations it should stay \
-         below 1 for 68 % and below 2 for 95 % of them. The extractor sees colours only.\n\n",
+    let figure = |Figure { file, caption, .. }: &Figure| format!("![{caption}]({file})\n\n");
+    let section = |factor: Factor| {
+        let About { heading, explanation, .. } = about(factor);
+        format!("## {heading}\n\n{explanation}\n\n{}\n", factor_table(study, factor))
+    };
+    format!(
+        include_str!("page.md"),
+        command = command,
         version = study.version,
         worlds = worlds.join(", "),
+        width = study.size_px[0],
+        height = study.size_px[1],
         keypoints = study.keypoints,
-    );
-    for Figure { file, caption, .. } in figures {
-        let _ = writeln!(text, "![{caption}]({file})\n");
-    }
-    for factor in measured(study) {
-        let About { heading, explanation, .. } = about(factor);
-        let _ = writeln!(text, "## {heading}\n\n{explanation}\n\n{}", factor_table(study, factor));
-    }
-    text += &wrong_matches(study);
-    text += &objects(study);
-    if let Some(detections) = detections {
-        text += &detections.section(study);
-    }
-    text
+        right = RIGHT_PX,
+        figures = figures.iter().map(figure).collect::<String>(),
+        factors = measured(study).map(section).collect::<String>(),
+        wrong = wrong_matches(study),
+        objects = objects(study),
+        opencv = detections.map_or_else(String::new, |detections| detections.section(study)),
+    )
 }
 
 /// Two quantiles of a spread.
@@ -336,12 +329,7 @@ fn wrong_matches(study: &VisionStudy) -> String {
         ]
     };
     let columns = "world | wrong of all | same instance | within 30 pixels | wild: neither instance nor place";
-    format!(
-        "## Wrong matches\n\nOf the matches that pass the check and are wrong, at all distances: how many lie on the same instance as \
-         the home feature (the right thing, another mark on it), and how many within 30 pixels of the right place. What is left is \
-         wild.\n\n{}\n",
-        table(columns, study.worlds.iter().map(row))
-    )
+    table(columns, study.worlds.iter().map(row))
 }
 
 /// Landmark objects.
@@ -358,9 +346,5 @@ fn objects(study: &VisionStudy) -> String {
     };
     let seen = study.levels.iter().filter(|c| c.factor == Factor::Distance && c.object_error_deg.is_some());
     let columns = "world | distance (m) | objects a panorama | error median, 95 % (degrees) | 68 %, 95 % (stated sd)";
-    format!(
-        "## Landmark objects\n\n`wayhome home --landmarks objects`: neighbouring features clustered, the centre of the cluster the \
-         bearing. The truth of an object is the mean azimuth of its features' places.\n\n{}\n",
-        table(columns, seen.map(row))
-    )
+    table(columns, seen.map(row))
 }
