@@ -14,7 +14,7 @@ const COLUMNS: &Columns<RunRow> = &[
     ("seed", |r| r.seed.to_string()),
     ("outcome", |r| r.outcome.to_string()),
     ("claimed_home", |r| r.claimed_home.map_or_else(String::new, |claimed| claimed.to_string())),
-    ("start_distance_m", |r| number(r.start_distance_m)),
+    ("start_distance_m", |r| number(r.initial_distance_m)),
     ("final_distance_m", |r| number(r.final_distance_m)),
     ("time_s", |r| number(r.time_s)),
     ("time_ratio", |r| number(r.time_ratio)),

@@ -112,7 +112,7 @@ pub fn seeds(batch: &SeedsSummary, rows: &[RunRow], folder: &Path) -> String {
         [
             row.seed.to_string(),
             row.outcome.to_string(),
-            number(row.start_distance_m, 1.0, ""),
+            number(row.initial_distance_m, 1.0, ""),
             number(row.final_distance_m, 100.0, ""),
             number(row.time_s, 1.0, ""),
             number(row.time_ratio, 1.0, ""),

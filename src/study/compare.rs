@@ -288,7 +288,7 @@ impl Standing {
         Self {
             contender: contender.clone(),
             tally: Tally::of(random),
-            path_ratio: Spread::of(came.filter_map(|row| Some(row.path_length_m? / row.start_distance_m?))),
+            path_ratio: Spread::of(came.filter_map(|row| Some(row.path_length_m? / row.initial_distance_m?))),
             aae_rad: (!errors.is_empty()).then(|| errors.iter().sum::<f64>() / errors.len() as f64),
             catchment_share: (!grid.is_empty()).then(|| arrived as f64 / grid.len() as f64),
             grid,

@@ -2,7 +2,7 @@
 
 use strum::{Display, EnumString};
 
-use crate::episode::{EstimateErrors, Outcome, Summary};
+use crate::episode::{Outcome, Summary};
 
 /// How a run ended, or why it has no result.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Display, EnumString)]
@@ -37,105 +37,84 @@ impl From<Outcome> for Ending {
     }
 }
 
-/// One run in numbers, those of its [`Summary`]; `None` where the run has no such number.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct RunRow {
-    /// Seed.
-    pub seed: u64,
-    /// How it ended.
-    pub outcome: Ending,
-    /// Why it did not end at home; empty where it did.
-    pub reason: String,
-    /// Whether the method claimed to be home, rightly or not.
-    pub claimed_home: Option<bool>,
-    /// Distance from home at the start, m.
-    pub start_distance_m: Option<f64>,
-    /// x of the start in the room, m.
-    pub start_x_m: Option<f64>,
-    /// y of the start in the room, m.
-    pub start_y_m: Option<f64>,
-    /// Heading at the start in the room, rad.
-    pub start_heading_rad: Option<f64>,
-    /// Distance from home at rest, m.
-    pub final_distance_m: Option<f64>,
-    /// Heading at rest against that of home, rad.
-    pub final_heading_error_rad: Option<f64>,
-    /// When it ended, s.
-    pub time_s: Option<f64>,
-    /// Time straight ahead to the arrival radius, s.
-    pub straight_line_time_s: Option<f64>,
-    /// The one over the other, of runs that reached home.
-    pub time_ratio: Option<f64>,
-    /// Length of the true path, m.
-    pub path_length_m: Option<f64>,
-    /// Distance at the end between odometry alone and the truth, m.
-    pub odometry_drift_m: Option<f64>,
-    /// Contacts with walls and bodies.
-    pub collisions: Option<i64>,
-    /// Error of the last estimate's range, m.
-    pub range_error_m: Option<f64>,
-    /// Error of its bearing from home, rad.
-    pub bearing_error_rad: Option<f64>,
-    /// Error of its heading, rad.
-    pub heading_error_rad: Option<f64>,
-    /// Root mean square error of range over all estimates, m.
-    pub range_rmse_m: Option<f64>,
-    /// The same of bearing, rad.
-    pub bearing_rmse_rad: Option<f64>,
-    /// The same of heading, rad.
-    pub heading_rmse_rad: Option<f64>,
-    /// Mean normalised estimation error squared; 3 is consistent.
-    pub nees: Option<f64>,
-    /// Bearings in the home snapshot.
-    pub home_landmarks: Option<i64>,
-    /// Bearings a step that the sensor gave.
-    pub seen_mean: Option<f64>,
-    /// Bearings a step that the method used.
-    pub matched_mean: Option<f64>,
-    /// Bearings a step that the method refused.
-    pub rejected_mean: Option<f64>,
-    /// Control steps until the method stopped.
-    pub steps: Option<i64>,
-    /// What rendered: `cpu` or `gpu`.
-    pub renderer: Option<String>,
+/// Writes [`RunRow`] from one list of its numbers: each with its name, which tables call its column, what it is, and where a summary
+/// has it.
+macro_rules! run_row {
+    (reals { $($real:ident, $real_is:literal, $real_of:expr;)+ } ints { $($int:ident, $int_is:literal, $int_of:expr;)+ }) => {
+        /// One run in numbers, those of its [`Summary`]; `None` where the run has no such number.
+        #[derive(Debug, Clone, PartialEq, Default)]
+        pub struct RunRow {
+            /// Seed.
+            pub seed: u64,
+            /// How it ended.
+            pub outcome: Ending,
+            /// Why it did not end at home; empty where it did.
+            pub reason: String,
+            /// Whether the method claimed to be home, rightly or not.
+            pub claimed_home: Option<bool>,
+            $(#[doc = $real_is] pub $real: Option<f64>,)+
+            $(#[doc = $int_is] pub $int: Option<i64>,)+
+            /// What rendered: `cpu` or `gpu`.
+            pub renderer: Option<String>,
+        }
+
+        impl From<&Summary> for RunRow {
+            fn from(s: &Summary) -> Self {
+                Self {
+                    seed: s.seed,
+                    outcome: s.outcome.into(),
+                    reason: reason(s),
+                    claimed_home: Some(s.claimed_home),
+                    $($real: real($real_of)(s),)+
+                    $($int: Some($int_of(s) as i64),)+
+                    renderer: s.renderer.as_ref().map(|r| r.kind.clone()),
+                }
+            }
+        }
+
+        /// The real numbers by column, and the whole ones.
+        pub(super) const REALS: &[(&str, Field<f64>)] = &[$((stringify!($real), |r| &mut r.$real),)+];
+        pub(super) const INTS: &[(&str, Field<i64>)] = &[$((stringify!($int), |r| &mut r.$int),)+];
+    };
 }
 
-impl From<&Summary> for RunRow {
-    fn from(s: &Summary) -> Self {
-        let finite = |value: f64| Some(value).filter(|v| v.is_finite());
-        let estimate = |of: fn(&EstimateErrors) -> f64| s.estimate.as_ref().and_then(|e| finite(of(e)));
-        Self {
-            seed: s.seed,
-            outcome: s.outcome.into(),
-            reason: reason(s),
-            claimed_home: Some(s.claimed_home),
-            start_distance_m: finite(s.start_distance_m),
-            start_x_m: finite(s.start.x_m),
-            start_y_m: finite(s.start.y_m),
-            start_heading_rad: finite(s.start.heading_rad),
-            final_distance_m: finite(s.final_distance_m),
-            final_heading_error_rad: finite(s.final_heading_error_rad),
-            time_s: finite(s.time_s),
-            straight_line_time_s: s.straight_line_time_s.and_then(finite),
-            time_ratio: s.time_ratio.and_then(finite),
-            path_length_m: finite(s.path_length_m),
-            odometry_drift_m: finite(s.odometry_drift_m),
-            collisions: Some(s.collisions as i64),
-            range_error_m: estimate(|e| e.range_error_m),
-            bearing_error_rad: estimate(|e| e.bearing_error_rad),
-            heading_error_rad: estimate(|e| e.heading_error_rad),
-            range_rmse_m: estimate(|e| e.range_rmse_m),
-            bearing_rmse_rad: estimate(|e| e.bearing_rmse_rad),
-            heading_rmse_rad: estimate(|e| e.heading_rmse_rad),
-            nees: s.estimate.as_ref().and_then(|e| e.nees).and_then(finite),
-            home_landmarks: Some(s.landmarks.home as i64),
-            seen_mean: finite(s.landmarks.seen_mean),
-            matched_mean: finite(s.landmarks.matched_mean),
-            rejected_mean: finite(s.landmarks.rejected_mean),
-            steps: Some(s.steps as i64),
-            renderer: s.renderer.as_ref().map(|r| r.kind.clone()),
-        }
+/// A number of a run, to be read or set.
+pub(super) type Field<T> = fn(&mut RunRow) -> &mut Option<T>;
+
+run_row! {
+    reals {
+        final_distance_m, "Distance from home at rest, m.", |s| s.final_distance_m;
+        final_heading_error_rad, "Heading at rest against that of home, rad.", |s| s.final_heading_error_rad;
+        time_s, "When it ended, s.", |s| s.time_s;
+        straight_line_time_s, "Time straight ahead to the arrival radius, s.", |s| s.straight_line_time_s;
+        time_ratio, "The one over the other, of runs that reached home.", |s| s.time_ratio;
+        path_length_m, "Length of the true path, m.", |s| s.path_length_m;
+        initial_distance_m, "Distance from home at the start, m.", |s| s.start_distance_m;
+        start_x_m, "x of the start in the room, m.", |s| s.start.x_m;
+        start_y_m, "y of the start in the room, m.", |s| s.start.y_m;
+        start_heading_rad, "Heading at the start in the room, rad.", |s| s.start.heading_rad;
+        odometry_drift_m, "Distance at the end between odometry alone and the truth, m.", |s| s.odometry_drift_m;
+        range_error_m, "Error of the last estimate's range, m.", |s| s.estimate.map(|e| e.range_error_m);
+        bearing_error_rad, "Error of its bearing from home, rad.", |s| s.estimate.map(|e| e.bearing_error_rad);
+        heading_error_rad, "Error of its heading, rad.", |s| s.estimate.map(|e| e.heading_error_rad);
+        range_rmse_m, "Root mean square error of range over all estimates, m.", |s| s.estimate.map(|e| e.range_rmse_m);
+        bearing_rmse_rad, "The same of bearing, rad.", |s| s.estimate.map(|e| e.bearing_rmse_rad);
+        heading_rmse_rad, "The same of heading, rad.", |s| s.estimate.map(|e| e.heading_rmse_rad);
+        nees, "Mean normalised estimation error squared; 3 is consistent.", |s| s.estimate.and_then(|e| e.nees);
+        seen_mean, "Bearings a step that the sensor gave.", |s| s.landmarks.seen_mean;
+        matched_mean, "Bearings a step that the method used.", |s| s.landmarks.matched_mean;
+        rejected_mean, "Bearings a step that the method refused.", |s| s.landmarks.rejected_mean;
     }
+    ints {
+        collisions, "Contacts with walls and bodies.", |s: &Summary| s.collisions;
+        home_landmarks, "Bearings in the home snapshot.", |s: &Summary| s.landmarks.home;
+        steps, "Control steps until the method stopped.", |s: &Summary| s.steps;
+    }
+}
+
+/// A number of a summary, where it is one.
+fn real<N: Into<Option<f64>>>(of: fn(&Summary) -> N) -> impl Fn(&Summary) -> Option<f64> {
+    move |summary| of(summary).into().filter(|value| value.is_finite())
 }
 
 /// Why a run did not end at home, in words.

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::spec::{Levels, Study};
 use super::value::Value;
 use crate::episode::Summary;
-use crate::study::row::{Ending, RunRow};
+use crate::study::row::{Ending, INTS, REALS, RunRow};
 use crate::table::{Cells, Table};
 
 /// One episode of a study.
@@ -36,37 +36,6 @@ impl Study {
         words.chain([format!("seed {}", row.run.seed)]).collect::<Vec<_>>().join(", ")
     }
 }
-
-/// A number of a run, to be read or set.
-type Field<T> = fn(&mut RunRow) -> &mut Option<T>;
-
-/// Real numbers of a run, by column and in the table's order.
-const REALS: [(&str, Field<f64>); 21] = [
-    ("final_distance_m", |r| &mut r.final_distance_m),
-    ("final_heading_error_rad", |r| &mut r.final_heading_error_rad),
-    ("time_s", |r| &mut r.time_s),
-    ("straight_line_time_s", |r| &mut r.straight_line_time_s),
-    ("time_ratio", |r| &mut r.time_ratio),
-    ("path_length_m", |r| &mut r.path_length_m),
-    ("initial_distance_m", |r| &mut r.start_distance_m),
-    ("start_x_m", |r| &mut r.start_x_m),
-    ("start_y_m", |r| &mut r.start_y_m),
-    ("start_heading_rad", |r| &mut r.start_heading_rad),
-    ("odometry_drift_m", |r| &mut r.odometry_drift_m),
-    ("range_error_m", |r| &mut r.range_error_m),
-    ("bearing_error_rad", |r| &mut r.bearing_error_rad),
-    ("heading_error_rad", |r| &mut r.heading_error_rad),
-    ("range_rmse_m", |r| &mut r.range_rmse_m),
-    ("bearing_rmse_rad", |r| &mut r.bearing_rmse_rad),
-    ("heading_rmse_rad", |r| &mut r.heading_rmse_rad),
-    ("nees", |r| &mut r.nees),
-    ("seen_mean", |r| &mut r.seen_mean),
-    ("matched_mean", |r| &mut r.matched_mean),
-    ("rejected_mean", |r| &mut r.rejected_mean),
-];
-/// Whole numbers of a run, likewise.
-const INTS: [(&str, Field<i64>); 3] =
-    [("collisions", |r| &mut r.collisions), ("home_landmarks", |r| &mut r.home_landmarks), ("steps", |r| &mut r.steps)];
 
 /// The rows as a table: where they belong, the axes' values, how they ended, and in numbers.
 pub fn table(study: &Study, rows: &[Row]) -> Table {
