@@ -13,11 +13,11 @@ use crate::geometry::{Matrix3, Pose, Twist, wrap};
 use crate::panorama::{Picture, Projection};
 
 /// Names a landmark (a feature or an object) of the home snapshot, or one met later on the way. Stable over a run.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
 pub struct LandmarkId(pub u32);
 
 /// Direction in which a landmark is seen.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Bearing {
     /// Which landmark.
     pub id: LandmarkId,
@@ -92,7 +92,7 @@ impl Bumper {
 }
 
 /// What was seen at home, stored before the run: bearings from the home pose. Their frame is the home frame.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct HomeSnapshot {
     /// Bearings at home, each id once.
     pub bearings: Vec<Bearing>,
@@ -117,7 +117,7 @@ pub struct Observation<'a> {
 }
 
 /// The robot's data sheet, as its maker would state it.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct RobotSheet {
     /// Distance between the wheels, m.
     pub track_m: f64,
@@ -132,7 +132,7 @@ pub struct RobotSheet {
 }
 
 /// The task: how fast to drive and when it counts as done.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct TaskSheet {
     /// Cruising speed, m/s.
     pub speed_m_s: f64,

@@ -135,14 +135,7 @@ impl ExecHoming {
 
 impl Method for ExecHoming {
     fn step(&mut self, observation: &Observation<'_>) -> Decision {
-        let failed = Decision {
-            command: Twist::default(),
-            estimate: None,
-            status: Status::Failed,
-            matched: 0,
-            rejected: 0,
-            nis: f64::NAN,
-        };
+        let failed = Decision { status: Status::Failed, ..Decision::command(Twist::default()) };
         if self.failure.is_some() {
             return failed;
         }

@@ -1,13 +1,16 @@
 //! The lines that go to a program and come back: one JSON object a line.
 //!
-//! The README describes them for those who write such programs; field names carry their units.
+//! The README describes them for those who write such programs; field names carry their units. What a robot knows goes out as
+//! [`observation`](crate::observation) has it.
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use serde::{Deserialize, Serialize};
 
 use crate::geometry::{Matrix3, Pose, Twist};
-use crate::observation::{Bearing, Briefing, BumperSector, Decision, Estimate, Observation, Status};
+use crate::observation::{
+    Bearing, Briefing, BumperSector, Decision, Estimate, HomeSnapshot, Observation, RobotSheet, Status, TaskSheet,
+};
 use crate::panorama::Picture;
 
 /// Version of what is said here. It grows when a program written for an older one would fail.
@@ -20,29 +23,13 @@ pub(super) struct Hello<'a> {
     kind: &'static str,
     protocol: u32,
     version: &'static str,
-    robot: Robot,
-    task: Task,
+    robot: &'a RobotSheet,
+    task: &'a TaskSheet,
     /// Whether observations tell a heading.
     compass: bool,
     /// `null` for a robot that gets bearings without panoramas.
     camera: Option<Camera>,
-    home: Home<'a>,
-}
-
-#[derive(Serialize)]
-struct Robot {
-    track_m: f64,
-    camera_offset_m: [f64; 2],
-    max_speed_m_s: f64,
-    max_turn_rate_rad_s: f64,
-    max_acceleration_m_s2: f64,
-}
-
-#[derive(Serialize)]
-struct Task {
-    speed_m_s: f64,
-    control_period_s: f64,
-    arrival_radius_m: f64,
+    home: &'a HomeSnapshot,
 }
 
 #[derive(Serialize)]
@@ -54,31 +41,14 @@ struct Camera {
     projection: crate::panorama::ProjectionKind,
 }
 
-#[derive(Serialize)]
-struct Home<'a> {
-    #[serde(serialize_with = "bearings")]
-    bearings: &'a [Bearing],
-}
-
 impl<'a> Hello<'a> {
     pub(super) fn new(briefing: &'a Briefing) -> Self {
-        let (robot, task) = (&briefing.robot, &briefing.task);
         Self {
             kind: "hello",
             protocol: PROTOCOL,
             version: crate::VERSION,
-            robot: Robot {
-                track_m: robot.track_m,
-                camera_offset_m: robot.camera_offset_m,
-                max_speed_m_s: robot.max_speed_m_s,
-                max_turn_rate_rad_s: robot.max_turn_rate_rad_s,
-                max_acceleration_m_s2: robot.max_acceleration_m_s2,
-            },
-            task: Task {
-                speed_m_s: task.speed_m_s,
-                control_period_s: task.control_period_s,
-                arrival_radius_m: task.arrival_radius_m,
-            },
+            robot: &briefing.robot,
+            task: &briefing.task,
             compass: briefing.compass,
             camera: briefing.camera.as_ref().map(|camera| Camera {
                 width_px: camera.projection.width,
@@ -87,19 +57,9 @@ impl<'a> Hello<'a> {
                 mount_rad: camera.projection.mount_rad,
                 projection: camera.projection.kind,
             }),
-            home: Home { bearings: &briefing.home.bearings },
+            home: &briefing.home,
         }
     }
-}
-
-fn bearings<S: serde::Serializer>(list: &[Bearing], serializer: S) -> Result<S::Ok, S::Error> {
-    #[derive(Serialize)]
-    struct Line {
-        id: u32,
-        azimuth_rad: f64,
-        sd_rad: f64,
-    }
-    serializer.collect_seq(list.iter().map(|b| Line { id: b.id.0, azimuth_rad: b.azimuth_rad, sd_rad: b.sd_rad }))
 }
 
 /// The program's answer to the hello: what it wants to be sent.
@@ -129,7 +89,6 @@ pub(super) struct Line<'a> {
     kind: &'static str,
     time_s: f64,
     odometry: Motion,
-    #[serde(serialize_with = "bearings")]
     bearings: &'a [Bearing],
     compass_rad: Option<f64>,
     /// Sectors of the bumper that were pressed since the last observation.
