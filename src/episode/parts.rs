@@ -28,8 +28,9 @@ impl<'a> Parts<'a> {
     /// Those that `setup` names, in `world`.
     ///
     /// # Errors
-    /// When the world cannot be packed, the plant or the renderer cannot be had, or the set cannot be opened.
+    /// When [`Setup::check`] finds a fault, the world cannot be packed, the plant or the renderer cannot be had, or the set cannot be opened.
     pub fn new(world: &'a World, setup: &Setup) -> Result<Self> {
+        setup.check()?;
         Self::shared(world, setup, &Shared::new(world, setup)?)
     }
 
@@ -101,10 +102,10 @@ fn sensor<'a>(world: &'a World, setup: &Setup, shared: &Shared) -> Result<Box<dy
         (None, None) => Box::new(IdealSensor::new(world)),
     };
     if !setup.degradation.is_none() {
-        sensor = Box::new(DegradedSensor::new(sensor, setup.degradation)?);
+        sensor = Box::new(DegradedSensor::new(sensor, setup.degradation));
     }
     if let Some(sd_rad) = setup.compass_sd_rad {
-        sensor = Box::new(CompassSensor::new(sensor, world.home, sd_rad)?);
+        sensor = Box::new(CompassSensor::new(sensor, world.home, sd_rad));
     }
     Ok(sensor)
 }

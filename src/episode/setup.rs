@@ -13,7 +13,7 @@ use crate::observation::{Briefing, CameraSheet, RobotSheet, TaskSheet};
 use crate::panorama::{Panorama, Projection};
 use crate::random::Seed;
 use crate::render::{RendererChoice, Scene};
-use crate::sensor::{DatasetChoice, Degradation, Noise, Sensor};
+use crate::sensor::{DatasetChoice, Degradation, Noise, Sensor, check_deviation, check_share};
 use crate::vision::ExtractorSettings;
 use crate::world::{CameraPreset, LightPreset, OpticsSpec, TaskSpec, World};
 
@@ -232,17 +232,11 @@ impl Setup {
         if self.method != MethodKind::PaperEkf && (self.initial_estimate.is_some() || self.told_start) {
             return invalid("initial estimate", "one".into(), "none: only paper-ekf is started from a supposed pose");
         }
-        let share = |what: &str, value: f64| {
-            if (0.0..=1.0).contains(&value) { Ok(()) } else { invalid(what, value.to_string(), "0 to 1") }
-        };
-        let deviation = |what: &str, value: f64| {
-            if value >= 0.0 && value.is_finite() { Ok(()) } else { invalid(what, format!("{value} rad"), "0 or more") }
-        };
         let noise = self.noise.unwrap_or_default();
-        deviation("noise of bearings", noise.sd_rad)?;
-        share("share of bearings that drop out", noise.dropout)?;
-        share("share of bearings that are false", noise.false_match)?;
-        deviation("noise of the compass", self.compass_sd_rad.unwrap_or(0.0))?;
+        check_deviation("noise of bearings", noise.sd_rad)?;
+        check_share("share of bearings that drop out", noise.dropout)?;
+        check_share("share of bearings that are false", noise.false_match)?;
+        check_deviation("noise of the compass", self.compass_sd_rad.unwrap_or(0.0))?;
         self.degradation.check()?;
         if self.time_limit_s.is_some_and(|limit| !(limit > 0.0 && limit.is_finite())) {
             return invalid("time limit", format!("{} s", self.time_limit_s.unwrap_or_default()), "more than 0");

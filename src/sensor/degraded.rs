@@ -5,13 +5,11 @@ use std::f64::consts::{PI, TAU};
 
 use rand::RngExt;
 
-use super::{Sensor, SensorTiming};
-use crate::error::{Error, Result};
+use super::{Sensor, check_deviation, check_share};
+use crate::error::Result;
 use crate::geometry::{Pose, wrap};
 use crate::observation::{Bearing, HomeSnapshot, LandmarkId};
-use crate::panorama::Panorama;
 use crate::random::{Seed, Stream, standard_normal};
-use crate::render::RendererInfo;
 
 /// What is done to the bearings of a sensor, on top of the faults that they have anyway.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -36,18 +34,9 @@ impl Degradation {
     /// # Errors
     /// When a value is out of its range.
     pub fn check(&self) -> Result<()> {
-        let invalid = |what: &str, found: f64, allowed: &str| {
-            Err(Error::Invalid { what: what.into(), found: found.to_string(), allowed: allowed.into() })
-        };
-        for (what, share) in [("share of hidden landmarks", self.hidden), ("share of false matches", self.false_match)] {
-            if !(0.0..=1.0).contains(&share) {
-                return invalid(what, share, "0 to 1");
-            }
-        }
-        if !(self.noise_sd_rad >= 0.0 && self.noise_sd_rad.is_finite()) {
-            return invalid("added bearing noise (rad)", self.noise_sd_rad, "0 or greater");
-        }
-        Ok(())
+        check_share("share of hidden landmarks", self.hidden)?;
+        check_share("share of false matches", self.false_match)?;
+        check_deviation("added noise of bearings", self.noise_sd_rad)
     }
 }
 
@@ -69,13 +58,9 @@ pub struct DegradedSensor<'a> {
 
 impl<'a> DegradedSensor<'a> {
     /// Makes `sensor` worse.
-    ///
-    /// # Errors
-    /// When a value of the degradation is out of its range.
-    pub fn new(sensor: Box<dyn Sensor + 'a>, degradation: Degradation) -> Result<Self> {
-        degradation.check()?;
+    pub fn new(sensor: Box<dyn Sensor + 'a>, degradation: Degradation) -> Self {
         let seed = Seed(0);
-        Ok(Self {
+        Self {
             sensor,
             home: HomeSnapshot::default(),
             degradation,
@@ -84,7 +69,7 @@ impl<'a> DegradedSensor<'a> {
             hidden: BTreeMap::new(),
             false_match: seed.stream("false-match"),
             normal: seed.stream("noise"),
-        })
+        }
     }
 
     fn is_hidden(&mut self, id: LandmarkId) -> bool {
@@ -156,20 +141,8 @@ impl Sensor for DegradedSensor<'_> {
         Ok(seen)
     }
 
-    fn home_panorama(&self) -> Option<&Panorama> {
-        self.sensor.home_panorama()
-    }
-
-    fn panorama(&self) -> Option<&Panorama> {
-        self.sensor.panorama()
-    }
-
-    fn renderer(&self) -> Option<&RendererInfo> {
-        self.sensor.renderer()
-    }
-
-    fn timing(&self) -> SensorTiming {
-        self.sensor.timing()
+    fn inner(&self) -> Option<&dyn Sensor> {
+        Some(self.sensor.as_ref())
     }
 }
 
@@ -201,7 +174,7 @@ mod tests {
     }
 
     fn sensor(degradation: Degradation, seed: u64) -> DegradedSensor<'static> {
-        let mut sensor = DegradedSensor::new(Box::new(Carousel::new()), degradation).unwrap();
+        let mut sensor = DegradedSensor::new(Box::new(Carousel::new()), degradation);
         sensor.reset(Seed(seed)).unwrap();
         sensor
     }

@@ -22,7 +22,7 @@ pub use ideal::IdealSensor;
 pub use noisy::{Noise, NoisySensor};
 pub use rendered::{RenderedSensor, Sight};
 
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::geometry::Pose;
 use crate::observation::{Bearing, HomeSnapshot};
 use crate::panorama::Panorama;
@@ -53,24 +53,29 @@ pub trait Sensor: Send {
         None
     }
 
+    /// The sensor whose bearings this one changes: what it does not say itself of a camera, that one says.
+    fn inner(&self) -> Option<&dyn Sensor> {
+        None
+    }
+
     /// The panorama from home, where the sensor has a camera.
     fn home_panorama(&self) -> Option<&Panorama> {
-        None
+        self.inner()?.home_panorama()
     }
 
     /// The last panorama seen, where the sensor has a camera.
     fn panorama(&self) -> Option<&Panorama> {
-        None
+        self.inner()?.panorama()
     }
 
     /// What renders, where the sensor has a camera.
     fn renderer(&self) -> Option<&RendererInfo> {
-        None
+        self.inner()?.renderer()
     }
 
     /// Wall-clock time spent in `observe` so far.
     fn timing(&self) -> SensorTiming {
-        SensorTiming::default()
+        self.inner().map_or_else(SensorTiming::default, Sensor::timing)
     }
 }
 
@@ -81,4 +86,16 @@ pub struct SensorTiming {
     pub render_s: f64,
     /// Turning panoramas into bearings, s.
     pub vision_s: f64,
+}
+
+/// Refuses a share or a probability that is none.
+pub(crate) fn check_share(what: &str, share: f64) -> Result<()> {
+    let fault = || Error::Invalid { what: what.into(), found: share.to_string(), allowed: "0 to 1".into() };
+    if (0.0..=1.0).contains(&share) { Ok(()) } else { Err(fault()) }
+}
+
+/// Refuses a standard deviation of an angle that is none.
+pub(crate) fn check_deviation(what: &str, sd_rad: f64) -> Result<()> {
+    let fault = || Error::Invalid { what: what.into(), found: format!("{sd_rad} rad"), allowed: "0 or more".into() };
+    if sd_rad >= 0.0 && sd_rad.is_finite() { Ok(()) } else { Err(fault()) }
 }
