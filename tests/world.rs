@@ -1,6 +1,6 @@
 //! World files: the built-in worlds, what validation finds, where a robot may start, and the map.
 
-use wayhome::draw::map::{MapDrawing, PathStyle, world_svg};
+use wayhome::draw::map::{MapDrawing, Stroke, world_svg};
 use wayhome::fault::Fault;
 use wayhome::geometry::{Pose, Vector2};
 use wayhome::random::Seed;
@@ -459,7 +459,7 @@ fn maps_show_what_the_world_has() {
 fn a_run_is_drawn_to_scale() {
     let world = World::from_toml(SOUND, "sound.toml").expect("sound");
     let corners = [Vector2::new(1.0, 1.0), Vector2::new(3.0, 1.0), Vector2::new(f64::NAN, 0.0), Vector2::new(3.0, 2.0)];
-    let style = PathStyle { colour: "#123456", width_px: 1.0, dashes: "" };
+    let style = Stroke { colour: "#123456", width_px: 1.0, dashes: "" };
     let map = MapDrawing::new(&world)
         .path(corners, &style, "a < b")
         .ellipse(&Pose::new(2.0, 1.5, 0.0), [[0.04, 0.0], [0.0, 0.01]], 2.0)

@@ -1,9 +1,9 @@
 //! The room from above as pixels: what the map of a run shows, at one moment of it.
 
-use tiny_skia::{Color, FillRule, LineCap, LineJoin, Paint, Path, PathBuilder, Pixmap, Stroke, StrokeDash, Transform};
+use tiny_skia::{Color, FillRule, LineCap, LineJoin, Paint, Path, PathBuilder, Pixmap, Stroke as Pen, StrokeDash, Transform};
 
 use super::map::paint::{BodyPaint, HOME, SEEN_THROUGH, STARTS, WALL, friction_colour, rgb};
-use super::map::{PathStyle, ellipse_axes};
+use super::map::{Stroke, ellipse_axes};
 use super::shapes::INK;
 use crate::geometry::{Pose, Vector2, direction};
 use crate::world::polygon::bounds;
@@ -109,11 +109,7 @@ impl<'a> RoomRaster<'a> {
 
     fn draw_body(&self, onto: &mut Pixmap, k: usize, body: &Body, at: &Pose) {
         let hangs = self.hangs(body);
-        let paint = match () {
-            () if k < self.world.landmark_count => BodyPaint::landmark(hangs),
-            () if body.motion.is_some() => BodyPaint::mover(hangs),
-            () => BodyPaint::obstacle(hangs),
-        };
+        let paint = BodyPaint::of(self.world, k, hangs);
         let shape = match &body.footprint {
             Footprint::Disc(radius) => disc(self.at(at.position()), self.px(*radius).max(LEAST_RADIUS_PX)),
             Footprint::Polygon(corners) => self.polygon(corners, at),
@@ -143,7 +139,7 @@ impl<'a> RoomRaster<'a> {
         for (k, (body, at)) in self.world.bodies.iter().zip(sight.bodies).enumerate().filter(|(_, (b, _))| b.motion.is_some()) {
             self.draw_body(&mut picture, k, body, at);
         }
-        for (path, style) in [(sight.truth, PathStyle::TRUTH), (sight.estimate, PathStyle::ESTIMATE)] {
+        for (path, style) in [(sight.truth, Stroke::TRUTH), (sight.estimate, Stroke::ESTIMATE)] {
             for piece in path.split(|pose| !pose.is_finite()).filter(|piece| piece.len() > 1) {
                 let points: Vec<_> = piece.iter().map(|pose| self.at(pose.position())).collect();
                 stroke(&mut picture, polyline(&points).as_ref(), style.colour, style.width_px as f32, &[]);
@@ -157,11 +153,11 @@ impl<'a> RoomRaster<'a> {
             let corners: Vec<_> = (0..48).map(corner).map(|d| Vector2::new(radii[0] * d.x, radii[1] * d.y)).collect();
             if radii[0].is_finite() {
                 let shape = self.polygon(&corners, &along);
-                fill(&mut picture, shape.as_ref(), PathStyle::ESTIMATE.colour, 0.2);
-                stroke(&mut picture, shape.as_ref(), PathStyle::ESTIMATE.colour, 1.2, &[]);
+                fill(&mut picture, shape.as_ref(), Stroke::ESTIMATE.colour, 0.2);
+                stroke(&mut picture, shape.as_ref(), Stroke::ESTIMATE.colour, 1.2, &[]);
             }
             let outline = disc(self.at(believed.position()), self.px(radius_m).max(5.0));
-            stroke(&mut picture, outline.as_ref(), PathStyle::ESTIMATE.colour, 1.5, &[4.0, 3.0]);
+            stroke(&mut picture, outline.as_ref(), Stroke::ESTIMATE.colour, 1.5, &[4.0, 3.0]);
         }
         if let Some(robot) = sight.truth.last() {
             let body = disc(self.at(robot.position()), self.px(radius_m).max(5.0));
@@ -213,7 +209,7 @@ fn fill(onto: &mut Pixmap, shape: Option<&Path>, colour: &str, opacity: f32) {
 fn stroke(onto: &mut Pixmap, shape: Option<&Path>, colour: &str, width: f32, dashes: &[f32]) {
     if let Some(shape) = shape {
         let dash = if dashes.is_empty() { None } else { StrokeDash::new(dashes.to_vec(), 0.0) };
-        let pen = Stroke { width, dash, line_cap: LineCap::Round, line_join: LineJoin::Round, ..Stroke::default() };
+        let pen = Pen { width, dash, line_cap: LineCap::Round, line_join: LineJoin::Round, ..Pen::default() };
         onto.stroke_path(shape, &paint(colour, 1.0), &pen, Transform::identity(), None);
     }
 }

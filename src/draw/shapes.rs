@@ -10,6 +10,54 @@ pub(crate) const FAINT_INK: &str = "#6b6b6b";
 /// Lines of a grid.
 pub(super) const GRID: &str = "#e8e7e3";
 
+/// Colours that people with any colour vision tell apart (Okabe and Ito 2008), for series in order.
+pub const SERIES: [&str; 6] = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9"];
+
+/// How a line is drawn.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[must_use]
+pub struct Stroke {
+    /// Colour, as SVG has it.
+    pub colour: &'static str,
+    /// Width, px.
+    pub width_px: f64,
+    /// Lengths of dashes and gaps, px, as SVG has them; empty for a full line.
+    pub dashes: &'static str,
+}
+
+impl Stroke {
+    /// What theory says.
+    pub const EXACT: Self = Self { colour: INK, width_px: 1.6, dashes: "" };
+    /// A bound or another thing to compare with.
+    pub const BOUND: Self = Self { colour: FAINT_INK, width_px: 1.3, dashes: "5 4" };
+    /// The true path of a run.
+    pub const TRUTH: Self = Self { colour: INK, width_px: 2.0, dashes: "" };
+    /// The estimated path.
+    pub const ESTIMATE: Self = Self { colour: SERIES[1], width_px: 1.6, dashes: "5 3" };
+    /// The path by wheel odometry alone.
+    pub const ODOMETRY: Self = Self { colour: SERIES[2], width_px: 1.4, dashes: "2 3" };
+
+    /// A full line in one of the [`SERIES`] colours, round and round.
+    pub fn series(k: usize) -> Self {
+        Self { colour: SERIES[k % SERIES.len()], width_px: 1.8, dashes: "" }
+    }
+
+    /// The same line with dashes.
+    pub fn dashed(self, dashes: &'static str) -> Self {
+        Self { dashes, ..self }
+    }
+}
+
+/// Sets a shape's line.
+pub(crate) fn stroked<N: svg::Node>(mut shape: N, stroke: &Stroke) -> N {
+    shape.assign("stroke", stroke.colour);
+    shape.assign("stroke-width", px(stroke.width_px));
+    if !stroke.dashes.is_empty() {
+        shape.assign("stroke-dasharray", stroke.dashes);
+    }
+    shape
+}
+
 /// A white page.
 pub(super) fn page(width: f64, height: f64) -> Document {
     Document::new()

@@ -1,6 +1,6 @@
 //! The files of one open-loop drive.
 
-use crate::draw::map::{MapDrawing, PathStyle};
+use crate::draw::map::{MapDrawing, Stroke};
 use crate::episode::open_loop::{DriveStep, DriveSummary};
 use crate::error::Result;
 use crate::geometry::{Pose, Vector2};
@@ -105,8 +105,8 @@ impl<'a> DriveFiles<'a> {
         self.folder.complete(self.collisions)?;
         let drawing = MapDrawing::new(self.world)
             .title(format!("Open-loop drive in {}", self.world.spec.name))
-            .path(self.truth.points(), &PathStyle::TRUTH, "true path")
-            .path(self.odometry.points(), &PathStyle::ODOMETRY, "path by odometry");
+            .path(self.truth.points(), &Stroke::TRUTH, "true path")
+            .path(self.odometry.points(), &Stroke::ODOMETRY, "path by odometry");
         let drawing = match self.ends {
             Some((start, end)) => drawing.start(&start).end(&end),
             None => drawing,

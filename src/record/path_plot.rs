@@ -1,6 +1,6 @@
 //! The path of a run on the world's map.
 
-use crate::draw::map::{MapDrawing, PathStyle};
+use crate::draw::map::{MapDrawing, Stroke};
 use crate::episode::{Outcome, Record, Step};
 use crate::geometry::{Pose, Vector2, sin_cos};
 use crate::observation::Estimate;
@@ -25,12 +25,12 @@ pub(crate) fn path_drawing(world: &World, record: &Record) -> MapDrawing {
         .map(|estimate| (record.home.compose(&estimate.pose), estimate))
         .collect();
     let mut drawing = MapDrawing::new(world)
-        .path(positions(&record.steps, |s| s.dead_reckoned), &PathStyle::ODOMETRY, "path by odometry alone")
-        .path(positions(&record.steps, |s| s.truth), &PathStyle::TRUTH, "true path")
+        .path(positions(&record.steps, |s| s.dead_reckoned), &Stroke::ODOMETRY, "path by odometry alone")
+        .path(positions(&record.steps, |s| s.truth), &Stroke::TRUTH, "true path")
         .start(&record.first().truth)
         .end(&record.last().truth);
     if !believed.is_empty() {
-        drawing = drawing.path(believed.iter().map(|(pose, _)| pose.position()), &PathStyle::ESTIMATE, "estimated path");
+        drawing = drawing.path(believed.iter().map(|(pose, _)| pose.position()), &Stroke::ESTIMATE, "estimated path");
     }
     for (pose, estimate) in believed.iter().step_by(believed.len().div_ceil(ELLIPSES).max(1)) {
         drawing = drawing.ellipse(pose, in_room(&record.home, estimate), K_SIGMA);

@@ -73,11 +73,7 @@ pub(super) fn moved(world: &World, before: &[Pose], now: &[Pose], time_ns: u64) 
 }
 
 fn body_entity(world: &World, k: usize, body: &Body, at: &Pose, time_ns: u64) -> SceneEntity {
-    let paint = match () {
-        () if k < world.landmark_count => BodyPaint::landmark(false),
-        () if body.motion.is_some() => BodyPaint::mover(false),
-        () => BodyPaint::obstacle(false),
-    };
+    let paint = BodyPaint::of(world, k, false);
     let color = colour(paint.fill, 1.0);
     // The number keeps bodies of one name apart.
     let mut entity = entity(&format!("{k} {}", body.name), "map", time_ns);

@@ -20,8 +20,9 @@ mod ramp;
 
 use svg::node::element::{Circle, ClipPath, Definitions, Group};
 
-pub(crate) use crate::draw::shapes::{FAINT_INK, INK, line, px, rectangle, text};
+pub(crate) use crate::draw::shapes::{FAINT_INK, INK, line, px, rectangle, stroked, text};
 use crate::draw::shapes::{GRID, circle, page, polyline};
+pub use crate::draw::shapes::{SERIES, Stroke};
 pub use axis::Axis;
 use axis::Placed;
 pub use bars::{BarSeries, Bars};
@@ -34,38 +35,6 @@ const HEIGHT_PX: f64 = 440.0;
 const PLOT_PX: [f64; 4] = [78.0, 50.0, 560.0, 382.0];
 /// Where the legend begins, px.
 const LEGEND_PX: f64 = 584.0;
-
-/// Colours that people with any colour vision tell apart (Okabe and Ito 2008), for series in order.
-pub const SERIES: [&str; 6] = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9"];
-
-/// How a line is drawn.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[must_use]
-pub struct Stroke {
-    /// Colour, as SVG has it.
-    pub colour: &'static str,
-    /// Width, px.
-    pub width_px: f64,
-    /// Lengths of dashes and gaps, px, as SVG has them; empty for a full line.
-    pub dashes: &'static str,
-}
-
-impl Stroke {
-    /// What theory says.
-    pub const EXACT: Self = Self { colour: INK, width_px: 1.6, dashes: "" };
-    /// A bound or another thing to compare with.
-    pub const BOUND: Self = Self { colour: FAINT_INK, width_px: 1.3, dashes: "5 4" };
-
-    /// A full line in one of the [`SERIES`] colours, round and round.
-    pub fn series(k: usize) -> Self {
-        Self { colour: SERIES[k % SERIES.len()], width_px: 1.8, dashes: "" }
-    }
-
-    /// The same line with dashes.
-    pub fn dashed(self, dashes: &'static str) -> Self {
-        Self { dashes, ..self }
-    }
-}
 
 /// How a point is drawn: a disc with a white rim.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -314,16 +283,6 @@ fn wrapped(text: &str, most: usize) -> Vec<String> {
 
 pub(crate) fn disc(at: [f64; 2], mark: &Mark) -> Circle {
     circle(at, mark.radius_px).set("fill", mark.colour).set("stroke", "#ffffff").set("stroke-width", 1)
-}
-
-/// Sets a shape's line.
-pub(crate) fn stroked<N: svg::Node>(mut shape: N, stroke: &Stroke) -> N {
-    shape.assign("stroke", stroke.colour);
-    shape.assign("stroke-width", px(stroke.width_px));
-    if !stroke.dashes.is_empty() {
-        shape.assign("stroke-dasharray", stroke.dashes);
-    }
-    shape
 }
 
 #[cfg(test)]

@@ -2,7 +2,7 @@
 
 use svg::node::element::Group;
 
-use super::PathStyle;
+use super::Stroke;
 use super::paint::{self, BodyPaint, STARTS, polyline};
 use crate::draw::chart::Ramp;
 use crate::draw::shapes::{INK, circle, rectangle, text};
@@ -18,7 +18,7 @@ pub(super) enum Swatch {
     Region,
     NamedStart,
     Robot(&'static str),
-    Path(PathStyle),
+    Path(Stroke),
     Ellipse,
     Field(Ramp),
     Arrow,
@@ -112,7 +112,7 @@ impl Swatch {
                 let inner = if *colour == INK { INK } else { "#ffffff" };
                 group.add(paint::robot(middle, 7.0, 0.0, colour, inner))
             }
-            Self::Path(style) => group.add(style.stroke(&[left, right])),
+            Self::Path(style) => group.add(super::path(style, &[left, right])),
             Self::Ellipse => group.add(paint::ellipse(middle, [11.0, 5.5], 0.0)),
             Self::Field(ramp) => (0..6).fold(group, |group, k| {
                 let colour = ramp.colour(ramp.low + f64::from(k) / 5.0 * (ramp.high - ramp.low)).0;

@@ -5,13 +5,13 @@
 //! scale, and the same input gives the same bytes.
 //!
 //! ```
-//! # use wayhome::{draw::map::{MapDrawing, PathStyle}, world::World, geometry::Pose};
+//! # use wayhome::{draw::map::{MapDrawing, Stroke}, world::World, geometry::Pose};
 //! # fn main() -> wayhome::Result<()> {
 //! let world = World::open("lab")?;
 //! let start = Pose::new(5.5, 4.0, 3.0);
 //! let svg = MapDrawing::new(&world)
 //!     .title("One run in the lab")
-//!     .path([start.position(), world.home.position()], &PathStyle::TRUTH, "true path")
+//!     .path([start.position(), world.home.position()], &Stroke::TRUTH, "true path")
 //!     .start(&start)
 //!     .to_svg();
 //! assert!(svg.starts_with("<svg"));
@@ -28,6 +28,7 @@ mod scenery;
 
 use svg::node::element::Group;
 
+pub use crate::draw::shapes::Stroke;
 use crate::draw::shapes::{INK, page, px, rectangle, text};
 use crate::geometry::{Pose, Vector2, atan2};
 use crate::world::World;
@@ -39,32 +40,11 @@ use paint::{ellipse, polyline};
 /// Width of a drawing, px.
 pub const WIDTH_PX: f64 = 900.0;
 
-/// How a path is drawn.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct PathStyle {
-    /// Colour, as SVG has it.
-    pub colour: &'static str,
-    /// Width, px.
-    pub width_px: f64,
-    /// Lengths of dashes and gaps, px, as SVG has them; empty for a full line.
-    pub dashes: &'static str,
-}
-
-impl PathStyle {
-    /// The true path.
-    pub const TRUTH: Self = Self { colour: "#1a1a1a", width_px: 2.0, dashes: "" };
-    /// The estimated path.
-    pub const ESTIMATE: Self = Self { colour: "#d55e00", width_px: 1.6, dashes: "5 3" };
-    /// The path by wheel odometry alone.
-    pub const ODOMETRY: Self = Self { colour: "#009e73", width_px: 1.4, dashes: "2 3" };
-
-    /// A line through points of the page.
-    fn stroke(&self, corners: &[Vector2<f64>]) -> svg::node::element::Polyline {
-        polyline(corners)
-            .set("stroke", self.colour)
-            .set("stroke-width", px(self.width_px))
-            .set("stroke-dasharray", if self.dashes.is_empty() { "none" } else { self.dashes })
-    }
+/// A path through points of the page.
+fn path(style: &Stroke, corners: &[Vector2<f64>]) -> svg::node::element::Polyline {
+    let dashes = if style.dashes.is_empty() { "none" } else { style.dashes };
+    let line = polyline(corners).set("stroke", style.colour).set("stroke-width", px(style.width_px));
+    line.set("stroke-dasharray", dashes)
 }
 
 /// A map that is being drawn: the world, and layers added one by one.
@@ -121,7 +101,7 @@ impl MapDrawing {
     }
 
     /// Adds a path through points of the room frame, m. Points that are not finite break the line.
-    pub fn path(mut self, points: impl IntoIterator<Item = Vector2<f64>>, style: &PathStyle, label: &str) -> Self {
+    pub fn path(mut self, points: impl IntoIterator<Item = Vector2<f64>>, style: &Stroke, label: &str) -> Self {
         let mut piece = Vec::new();
         let mut pieces = Vec::new();
         for point in points {
@@ -133,7 +113,7 @@ impl MapDrawing {
         }
         pieces.push(piece);
         for piece in pieces.iter().filter(|piece| piece.len() > 1) {
-            self.paths = self.paths.add(style.stroke(piece));
+            self.paths = self.paths.add(path(style, piece));
         }
         self.legend.add(Swatch::Path(*style), label);
         self

@@ -7,6 +7,7 @@ pub(super) use crate::draw::shapes::circle;
 use crate::draw::shapes::px;
 use crate::draw::shapes::{self, blend, line, points};
 use crate::geometry::{Vector2, direction};
+use crate::world::World;
 
 /// Walls.
 pub(crate) const WALL: &str = "#4a4a4a";
@@ -29,6 +30,15 @@ pub(crate) struct BodyPaint {
 }
 
 impl BodyPaint {
+    /// That of the body of this number in `world`.
+    pub(crate) fn of(world: &World, k: usize, dashed: bool) -> Self {
+        match () {
+            () if k < world.landmark_count => Self::landmark(dashed),
+            () if world.bodies[k].motion.is_some() => Self::mover(dashed),
+            () => Self::obstacle(dashed),
+        }
+    }
+
     pub(crate) fn landmark(dashed: bool) -> Self {
         Self { fill: "#8db4d6", line: "#2f5d86", dashed }
     }

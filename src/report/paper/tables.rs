@@ -3,7 +3,7 @@
 use super::{Section, Target, short};
 use crate::control::Law;
 use crate::draw::image::colours_png;
-use crate::draw::map::{MapDrawing, PathStyle};
+use crate::draw::map::{MapDrawing, Stroke};
 use crate::draw::markdown::table_of_numbers;
 use crate::error::Result;
 use crate::geometry::Vector2;
@@ -71,8 +71,8 @@ fn path_figures(world: &World, runs: &[Run], name: &str) -> [Vec<u8>; 2] {
         let title = format!("{name}: {} law, filter started at the truth", law_name(law));
         let mut drawing = MapDrawing::new(world).title(title);
         for (run, colour) in runs.iter().filter(|r| r.law == law).zip(STARTS_IN) {
-            let truth = PathStyle { colour, width_px: 2.2, dashes: "" };
-            let believed = PathStyle { colour: "#1a1a1a", width_px: 1.0, dashes: "3 4" };
+            let truth = Stroke { colour, width_px: 2.2, dashes: "" };
+            let believed = Stroke { colour: "#1a1a1a", width_px: 1.0, dashes: "3 4" };
             let ended = run.track.time_s().map_or("not home".to_owned(), |t| format!("home after {t:.1} s"));
             let samples = &run.track.samples;
             let inside = |p: &Vector2<f64>| contains(&world.outline, *p);
