@@ -2,8 +2,10 @@
 
 use std::path::Path;
 
+use image::codecs::jpeg::JpegEncoder;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
-use image::{DynamicImage, ImageBuffer};
+use image::imageops::FilterType::Triangle;
+use image::{DynamicImage, ImageBuffer, RgbImage};
 
 use crate::error::{Error, Result};
 use crate::panorama::Panorama;
@@ -14,6 +16,25 @@ use crate::panorama::Panorama;
 /// When the panorama cannot be encoded; `name` is what the error calls it.
 pub fn colours_png(panorama: &Panorama, name: &str) -> Result<Vec<u8>> {
     panorama.picture().png().map_err(|source| Error::Image { path: Path::new(name).to_owned(), source })
+}
+
+/// The colours as a picture; `None` where the panorama has not all of them.
+pub(crate) fn colours(panorama: &Panorama) -> Option<RgbImage> {
+    RgbImage::from_raw(panorama.projection.width, panorama.projection.height, panorama.picture().rgb())
+}
+
+/// The colours as a JPEG file, made smaller where they are wider than `widest_px`.
+///
+/// # Errors
+/// When the panorama lacks colours or cannot be encoded; `name` is what the error calls it.
+pub(crate) fn colours_jpeg(panorama: &Panorama, quality: u8, widest_px: u32, name: &str) -> Result<Vec<u8>> {
+    let picture = DynamicImage::ImageRgb8(colours(panorama).ok_or_else(|| unfilled(name))?);
+    let small = picture.width() <= widest_px;
+    let picture = if small { picture } else { picture.resize(widest_px, picture.height(), Triangle) };
+    let mut bytes = Vec::new();
+    let written = picture.write_with_encoder(JpegEncoder::new_with_quality(&mut bytes, quality));
+    written.map_err(|source| Error::Image { path: Path::new(name).to_owned(), source })?;
+    Ok(bytes)
 }
 
 /// The range in millimetres, rounded, 16 bits; 65535 stands for all that is farther.
@@ -38,12 +59,12 @@ fn encode_16_bits(panorama: &Panorama, values: Vec<u16>, name: &str) -> Result<V
     let (width, height) = (panorama.projection.width, panorama.projection.height);
     let filled = values.len() == panorama.projection.pixels();
     let image = filled.then(|| ImageBuffer::from_raw(width, height, values)).flatten();
-    let image = image.ok_or_else(|| Error::Invalid {
-        what: format!("panorama for {name}"),
-        found: "a channel of another size than the panorama".into(),
-        allowed: "a value for every pixel".into(),
-    })?;
-    encode(&DynamicImage::ImageLuma16(image), name)
+    encode(&DynamicImage::ImageLuma16(image.ok_or_else(|| unfilled(name))?), name)
+}
+
+fn unfilled(name: &str) -> Error {
+    let found = "a channel of another size than the panorama".into();
+    Error::Invalid { what: format!("panorama for {name}"), found, allowed: "a value for every pixel".into() }
 }
 
 /// An image as a PNG file, by the fast compression: the better one takes twenty times as long for a tenth less.

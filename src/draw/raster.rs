@@ -1,5 +1,6 @@
 //! The room from above as pixels: what the map of a run shows, at one moment of it.
 
+use image::RgbImage;
 use tiny_skia::{Color, FillRule, LineCap, LineJoin, Paint, Path, PathBuilder, Pixmap, Stroke as Pen, StrokeDash, Transform};
 
 use super::map::paint::{BodyPaint, HOME, SEEN_THROUGH, STARTS, WALL, friction_colour, rgb};
@@ -178,6 +179,12 @@ impl<'a> RoomRaster<'a> {
         path.close();
         path.finish()
     }
+}
+
+/// A picture of a room as others have pictures: all of it lies on white paper, no pixel is see-through.
+pub(crate) fn opaque(room: &Pixmap) -> Option<RgbImage> {
+    let rgb = room.data().chunks_exact(4).flat_map(|p| [p[0], p[1], p[2]]).collect();
+    RgbImage::from_raw(room.width(), room.height(), rgb)
 }
 
 fn disc((x, y): (f32, f32), radius: f32) -> Option<Path> {

@@ -2,7 +2,7 @@
 
 use image::{DynamicImage, Rgb, RgbImage};
 
-use super::image::encode;
+use super::image::{colours, encode};
 use crate::error::Result;
 use crate::panorama::Panorama;
 
@@ -45,8 +45,7 @@ impl Sheet {
 
     /// Adds the colours of a panorama.
     pub fn add_colours(&mut self, panorama: &Panorama) {
-        let rgb = panorama.rgba.chunks_exact(4).flat_map(|p| [p[0], p[1], p[2]]).collect();
-        self.strips.extend(strip(panorama, rgb).map(|image| (image, GAP_PX[1])));
+        self.strips.extend(colours(panorama).map(|image| (image, GAP_PX[1])));
     }
 
     /// The sheet.

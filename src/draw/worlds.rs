@@ -5,7 +5,8 @@ use std::path::Path;
 use color_quant::NeuQuant;
 use image::{Rgb, RgbImage, imageops};
 
-use super::raster::RoomRaster;
+use super::image::colours;
+use super::raster::{RoomRaster, opaque};
 use crate::error::{Error, Result};
 use crate::panorama::Panorama;
 use crate::world::World;
@@ -35,11 +36,7 @@ impl WorldSheet {
     pub fn add(&mut self, world: &World, seen: &Panorama) -> Result<()> {
         let memory = || Error::Memory { bytes: 4 * (CELL_PX * ROOM_PX) as usize };
         let room = RoomRaster::new(world, CELL_PX, ROOM_PX).ok_or_else(memory)?.at_rest();
-        // All that is drawn lies on white paper: no pixel is see-through.
-        let rgb = room.data().chunks_exact(4).flat_map(|p| [p[0], p[1], p[2]]).collect();
-        let room = RgbImage::from_raw(room.width(), room.height(), rgb).ok_or_else(memory)?;
-        let (width, height) = (seen.projection.width, seen.projection.height);
-        let panorama = RgbImage::from_raw(width, height, seen.picture().rgb()).ok_or_else(memory)?;
+        let (room, panorama) = opaque(&room).zip(colours(seen)).ok_or_else(memory)?;
         let mut cell = RgbImage::from_pixel(CELL_PX, panorama.height() + room.height(), Rgb([255; 3]));
         imageops::replace(&mut cell, &panorama, 0, 0);
         imageops::replace(&mut cell, &room, 0, i64::from(panorama.height()));

@@ -10,8 +10,6 @@ use std::path::{Path, PathBuf};
 
 use foxglove::Encode;
 use foxglove::messages::{CompressedImage, FrameTransform, FrameTransforms, Log, Pose as FoxglovePose, PoseInFrame, log};
-use image::ExtendedColorType;
-use image::codecs::jpeg::JpegEncoder;
 use mcap::records::MessageHeader;
 use mcap::{McapError, WriteOptions, Writer};
 use schemars::JsonSchema;
@@ -20,6 +18,7 @@ use serde::Serialize;
 use super::file::{self, Kind, MAKER};
 use super::messages::{self, Command, Diagnostics, nanoseconds, timestamp, turn, vector};
 use super::scene;
+use crate::draw::image::colours_jpeg;
 use crate::episode::{Belief, CollisionRecord, Moment, Record, Recorder, Summary};
 use crate::error::{Error, Result};
 use crate::geometry::Pose;
@@ -163,11 +162,7 @@ fn line(time_ns: u64, level: log::Level, message: String) -> Log {
 
 /// A panorama as JPEG.
 fn picture(panorama: &Panorama, time_ns: u64) -> Result<CompressedImage> {
-    let mut data = Vec::new();
-    let (width, height) = (panorama.projection.width, panorama.projection.height);
-    JpegEncoder::new_with_quality(&mut data, JPEG_QUALITY)
-        .encode(&panorama.picture().rgb(), width, height, ExtendedColorType::Rgb8)
-        .map_err(|source| Error::Image { path: PathBuf::from("panorama"), source })?;
+    let data = colours_jpeg(panorama, JPEG_QUALITY, u32::MAX, "panorama")?;
     Ok(CompressedImage {
         timestamp: Some(timestamp(time_ns)),
         frame_id: "camera".to_owned(),

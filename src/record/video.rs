@@ -14,7 +14,8 @@ use image::imageops::FilterType;
 use image::{Rgb, RgbImage};
 
 use super::file::{self, Kind, MAKER};
-use crate::draw::raster::{RoomRaster, Sight};
+use crate::draw::image::colours;
+use crate::draw::raster::{RoomRaster, Sight, opaque};
 use crate::episode::{Moment, Record, Recorder, Summary};
 use crate::error::{Error, Result};
 use crate::geometry::Pose;
@@ -84,10 +85,7 @@ impl<'a> VideoRecording<'a> {
         if let Some(panorama) = &self.panorama {
             image::imageops::replace(&mut picture, panorama, 0, 0);
         }
-        let room = self.room.draw(sight);
-        // All that is drawn lies on white paper: no pixel is see-through.
-        let rgb = room.data().chunks_exact(4).flat_map(|p| [p[0], p[1], p[2]]).collect();
-        if let Some(room) = RgbImage::from_raw(room.width(), room.height(), rgb) {
+        if let Some(room) = opaque(&self.room.draw(sight)) {
             image::imageops::replace(&mut picture, &room, 0, i64::from(top));
         }
         picture
@@ -151,7 +149,7 @@ impl Recorder for VideoRecording<'_> {
 /// A panorama as wide as the film.
 fn strip(panorama: &Panorama) -> Option<RgbImage> {
     let (width, height) = (panorama.projection.width, panorama.projection.height);
-    let image = RgbImage::from_raw(width, height, panorama.picture().rgb())?;
+    let image = colours(panorama)?;
     let height = (f64::from(height) * f64::from(WIDTH_PX) / f64::from(width)).round().clamp(1.0, f64::from(ROOM_PX)) as u32;
     Some(image::imageops::resize(&image, WIDTH_PX, height, FilterType::Triangle))
 }
