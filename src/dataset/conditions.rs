@@ -2,7 +2,7 @@
 //!
 //! A condition is written as changes joined by `+`: `night+cheap`, `moved:2+exposure:1.5`. `original` changes nothing.
 
-use rand_pcg::rand_core::Rng;
+use rand::RngExt;
 use serde::Deserialize;
 use serde::de::value::{BorrowedStrDeserializer, Error as ValueError};
 
@@ -197,18 +197,8 @@ fn window_lit(spec: &mut WorldSpec, k: usize) -> Result<String> {
     Ok(words)
 }
 
-/// A number in [-1, 1).
-fn draw(stream: &mut Stream) -> f64 {
-    (stream.next_u64() >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
-}
-
-/// A whole number below `count`.
-fn pick(stream: &mut Stream, count: usize) -> usize {
-    (stream.next_u64() % count as u64) as usize
-}
-
 fn swap_textures(spec: &mut WorldSpec, stream: &mut Stream) {
-    spec.seed = stream.next_u64() >> 32;
+    spec.seed = stream.random::<u64>() >> 32;
     let room = &mut spec.room;
     let surfaces = room.walls.iter_mut().chain([&mut room.floor, &mut room.ceiling]);
     let bodies = spec.landmarks.iter_mut().chain(&mut spec.obstacles).map(|b| &mut b.texture);
@@ -222,7 +212,7 @@ fn swap_textures(spec: &mut WorldSpec, stream: &mut Stream) {
     }
     // Sattolo's shuffle: no image stays where it is.
     for k in (1..images.len()).rev() {
-        let other = pick(stream, k);
+        let other = (stream.random::<u64>() % k as u64) as usize;
         let (low, high) = images.split_at_mut(k);
         std::mem::swap(&mut low[other].image, &mut high[0].image);
     }
@@ -251,7 +241,7 @@ fn move_furniture(mut world: World, stream: &mut Stream) -> Result<World> {
         }
         let robot = Convex::disc(world.home.position(), world.spec.robot.radius_m + APART_M);
         for _ in 0..TRIES {
-            let [dx, dy, turn] = [draw(stream), draw(stream), draw(stream)];
+            let [dx, dy, turn] = std::array::from_fn(|_| 2.0 * stream.random::<f64>() - 1.0);
             let mut pose = body.pose;
             (pose.x, pose.y) = (pose.x + MOVED_M * dx, pose.y + MOVED_M * dy);
             pose.heading += (TURNED_DEG * turn).to_radians();

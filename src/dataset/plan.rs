@@ -3,7 +3,7 @@
 use std::f64::consts::{PI, TAU};
 use std::path::{Path, PathBuf};
 
-use rand_pcg::rand_core::Rng;
+use rand::RngExt;
 
 use super::conditions::{Condition, Staged};
 use crate::dataset::film;
@@ -336,16 +336,11 @@ fn spots(world: &World, request: &Request) -> Result<(Vec<Spot>, Option<GridDocu
             Headings::Own if own => vec![spot.robot.heading],
             Headings::Own => vec![world.home.heading],
             Headings::Fixed(headings) => headings.iter().map(|h| wrap(*h)).collect(),
-            Headings::Random(count) => (0..*count).map(|_| wrap(TAU * uniform(&mut turns) - PI)).collect(),
+            Headings::Random(count) => (0..*count).map(|_| wrap(TAU * turns.random::<f64>() - PI)).collect(),
         };
         headings.into_iter().map(move |heading| Spot { robot: Pose { heading, ..spot.robot }, ..spot })
     });
     Ok((spots.collect(), grid))
-}
-
-/// A number in [0, 1).
-fn uniform(stream: &mut Stream) -> f64 {
-    (stream.next_u64() >> 11) as f64 / (1_u64 << 53) as f64
 }
 
 fn random_places(world: &World, count: usize, stream: &mut Stream) -> Result<Vec<Spot>> {
@@ -361,7 +356,7 @@ fn random_places(world: &World, count: usize, stream: &mut Stream) -> Result<Vec
             return Err(Error::Unfit { what, found, needed: needed.into() });
         }
         tries += 1;
-        let (u, v) = (uniform(stream), uniform(stream));
+        let [u, v] = std::array::from_fn(|_| stream.random::<f64>());
         let robot = Pose::new(low.x + u * (high.x - low.x), low.y + v * (high.y - low.y), 0.0);
         if world.is_free(&robot, 0.0, &bodies).is_ok() {
             places.push(Spot { place: None, robot, time_s: None });

@@ -1,6 +1,6 @@
 //! What panoramas are taken under: how far off, how turned, in what light, with what noise, behind what.
 
-use rand_pcg::rand_core::Rng;
+use rand::RngExt;
 use serde::Serialize;
 use strum::{EnumMessage, IntoStaticStr, VariantArray};
 
@@ -133,7 +133,7 @@ const PATCH_PX: usize = 7;
 
 /// Puts upright things with a patchy dress into the picture, from top to bottom, until `share` of the columns is hidden.
 fn hide(panorama: &mut Panorama, share: f64, stream: &mut Stream) {
-    let mut unit = || (stream.next_u64() >> 11) as f64 / (1_u64 << 53) as f64;
+    let mut unit = || stream.random::<f64>();
     let (width, height) = (panorama.projection.width as usize, panorama.projection.height as usize);
     let mut hidden = vec![false; width];
     let wanted = (share * width as f64).round() as usize;
