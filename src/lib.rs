@@ -80,12 +80,12 @@
 //!
 //! | feature | what it adds |
 //! |---|---|
-//! | `cli` | the program `wayhome`; takes `rapier` along |
+//! | `cli` | the program `wayhome`; takes `rapier` and `video` along |
 //! | `gpu` | [`render::RendererChoice::Gpu`], by wgpu |
 //! | `parquet` | Parquet files: the rows of [`study::sweep`]s and the truth of [`dataset`]s |
 //! | `rapier` | the plant with mass, slip and collisions ([`episode::PlantKind::Rapier`]), and what [`verify`] holds it against |
 //! | `recording` | recordings of runs as MCAP files |
-//! | `video` | recordings of runs as animated GIFs |
+//! | `video` | rooms drawn in pixels: recordings of runs as animated GIFs, sheets of worlds |
 //!
 //! What is off does not exist, or is refused by [`Error::FeatureOff`], which names the feature. The unicycle, the CPU renderer,
 //! the extractor, all methods and studies are always there.

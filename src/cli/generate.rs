@@ -7,11 +7,12 @@ use anyhow::Result;
 use rayon::prelude::*;
 use serde::Serialize;
 use wayhome::Error;
-use wayhome::render::RendererChoice;
+use wayhome::draw::worlds::{CELL_PX, WorldSheet};
+use wayhome::panorama::Panorama;
+use wayhome::render::{self, Renderer, RendererChoice, Scene, View};
 use wayhome::storage::{OutputFolder, write_atomically};
-use wayhome::world::generate::{HEAD, Kind, Knob, Knobs, OUTLINE, Outline, generate, usual_outlines};
-
-use sheet::SheetMaker;
+use wayhome::world::World;
+use wayhome::world::generate::{Generated, HEAD, Kind, Knob, Knobs, OUTLINE, Outline, generate, usual_outlines};
 
 use super::context::{Context, Verdict, folder_or, print};
 use super::values::choice;
@@ -122,7 +123,7 @@ pub fn run(args: &GenerateArgs, context: &Context) -> Result<Verdict> {
         folder.finish()?;
     }
     if let (Some(path), Some(sheet)) = (&args.sheet, sheet) {
-        write_atomically(path, &sheet.png(path)?)?;
+        write_atomically(path, &sheet.sheet.png(path)?)?;
     }
     let shown = |path: Option<&PathBuf>| path.map(|p| p.display().to_string());
     let output = Output {
@@ -149,69 +150,25 @@ fn write_own(path: &Path, toml: &str) -> Result<()> {
     Ok(write_atomically(path, toml.as_bytes())?)
 }
 
-/// Sheets of worlds, which want the feature that draws pixels.
-#[cfg(feature = "video")]
-mod sheet {
-    use std::path::Path;
-
-    use anyhow::Result;
-    use wayhome::draw::worlds::{CELL_PX, WorldSheet};
-    use wayhome::panorama::Panorama;
-    use wayhome::render::{self, Renderer, RendererChoice, Scene, View};
-    use wayhome::world::World;
-    use wayhome::world::generate::Generated;
-
-    /// Renders worlds for a sheet.
-    pub struct SheetMaker {
-        renderer: Box<dyn Renderer>,
-        sheet: WorldSheet,
-    }
-
-    impl SheetMaker {
-        pub fn new(choice: RendererChoice) -> Result<Self> {
-            Ok(Self { renderer: render::create(choice)?, sheet: WorldSheet::default() })
-        }
-
-        pub fn add(&mut self, generated: &Generated) -> Result<()> {
-            let world = World::from_toml(&generated.toml, format!("{}.toml", generated.spec.name))?;
-            let camera = &world.spec.camera;
-            let projection = world.projection_of_size(CELL_PX, CELL_PX * camera.height_px / camera.width_px);
-            let mut seen = Panorama::black(projection);
-            let view = View { projection, robot: world.home, bodies: &world.body_poses() };
-            self.renderer.render(&Scene::new(&world)?, &view, &mut seen)?;
-            Ok(self.sheet.add(&world, &seen)?)
-        }
-
-        pub fn png(&self, path: &Path) -> Result<Vec<u8>> {
-            Ok(self.sheet.png(path)?)
-        }
-    }
+/// Renders worlds for a sheet.
+struct SheetMaker {
+    renderer: Box<dyn Renderer>,
+    sheet: WorldSheet,
 }
 
-/// What is there without it.
-#[cfg(not(feature = "video"))]
-mod sheet {
-    use std::path::Path;
+impl SheetMaker {
+    fn new(choice: RendererChoice) -> Result<Self> {
+        Ok(Self { renderer: render::create(choice)?, sheet: WorldSheet::default() })
+    }
 
-    use anyhow::Result;
-    use wayhome::render::RendererChoice;
-    use wayhome::world::generate::Generated;
-
-    /// There is none.
-    pub enum SheetMaker {}
-
-    impl SheetMaker {
-        pub fn new(_: RendererChoice) -> Result<Self> {
-            Err(wayhome::Error::FeatureOff { what: "a sheet of worlds", feature: "video" }.into())
-        }
-
-        pub fn add(&mut self, _: &Generated) -> Result<()> {
-            match *self {}
-        }
-
-        pub fn png(&self, _: &Path) -> Result<Vec<u8>> {
-            match *self {}
-        }
+    fn add(&mut self, generated: &Generated) -> Result<()> {
+        let world = World::from_toml(&generated.toml, format!("{}.toml", generated.spec.name))?;
+        let camera = &world.spec.camera;
+        let projection = world.projection_of_size(CELL_PX, CELL_PX * camera.height_px / camera.width_px);
+        let mut seen = Panorama::black(projection);
+        let view = View { projection, robot: world.home, bodies: &world.body_poses() };
+        self.renderer.render(&Scene::new(&world)?, &view, &mut seen)?;
+        Ok(self.sheet.add(&world, &seen)?)
     }
 }
 
