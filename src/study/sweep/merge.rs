@@ -1,14 +1,17 @@
 //! Putting the rows of many chunks together.
 
+use serde::{Deserialize, Serialize};
+
 use super::rows::Row;
 use super::spec::Study;
 
 /// What a file of rows says about the study that it belongs to.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Identity {
     /// Name of the study.
     pub study: String,
     /// [`Study::sha256`].
+    #[serde(rename = "study_sha256")]
     pub sha256: String,
     /// Version of the program that made the rows.
     pub version: String,

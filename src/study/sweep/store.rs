@@ -14,9 +14,7 @@ use serde::{Deserialize, Serialize};
 use crate::episode::Recorder;
 use crate::error::{Error, Result};
 use crate::record::run::RunFiles;
-use crate::storage::{MARKER, files, remove};
-use crate::storage::{PARTIAL, io_error};
-use crate::storage::{json, write_atomically};
+use crate::storage::{MARKER, PARTIAL, files, io_error, json, remove, write_atomically};
 use crate::study::sweep::merge::{Identity, merge};
 use crate::study::sweep::{Chunk, Failure, Row, Store, Study, rows};
 use crate::table::Table;
@@ -28,15 +26,16 @@ const RECORD: &str = "study.json";
 const ROWS: &str = "rows.parquet";
 const PARTS: &str = "parts";
 const FAILURES: &str = "failures";
+/// Where `sweep report` writes its page unless told otherwise.
+const REPORT: &str = "report";
 /// Beginning of the names of files that tell how fast it went.
 const RATE: &str = "rate-";
 
 /// `study.json`.
 #[derive(Debug, Serialize, Deserialize)]
 struct StudyRecord {
-    study: String,
-    study_sha256: String,
-    version: String,
+    #[serde(flatten)]
+    identity: Identity,
     /// Where the study was read from.
     source: PathBuf,
     seeds: [u64; 2],
@@ -76,8 +75,8 @@ impl StudyFolder {
     pub fn create(path: &Path, study: Study, source: &Path, keep_failures: bool) -> Result<Self> {
         Table::check_parquet()?;
         let held = if path.is_dir() { files(path)? } else { Vec::new() };
-        let ours = |name: &String| [MARKER, STUDY, RECORD, ROWS, PARTS, FAILURES].contains(&name.as_str());
-        let known = |name: &String| ours(name) || name.starts_with(RATE) || name.ends_with(PARTIAL) || is_report(name);
+        let ours = |name: &String| [MARKER, STUDY, RECORD, ROWS, PARTS, FAILURES, REPORT].contains(&name.as_str());
+        let known = |name: &String| ours(name) || name.starts_with(RATE) || name.ends_with(PARTIAL);
         let foreign = held.iter().find(|name| !known(name));
         if let Some(name) = foreign {
             return Err(Error::OutputTaken { path: path.to_owned(), found: format!("`{name}`") });
@@ -85,17 +84,13 @@ impl StudyFolder {
         let identity = Identity::of(&study);
         let parts = path.join(PARTS);
         if path.join(RECORD).is_file() {
-            let record = read_record(path)?;
-            let held = Identity { study: record.study, sha256: record.study_sha256, version: record.version };
-            if let Some(difference) = held.difference(&identity) {
+            if let Some(difference) = read_record(path)?.identity.difference(&identity) {
                 return Err(Error::OutputTaken { path: path.to_owned(), found: format!("rows of {difference}") });
             }
         } else {
             fs::create_dir_all(&parts).map_err(io_error("create folder", &parts))?;
             let record = StudyRecord {
-                study: identity.study,
-                study_sha256: identity.sha256,
-                version: identity.version,
+                identity,
                 source: source.to_owned(),
                 seeds: [*study.seeds.start(), *study.seeds.end()],
                 cells: study.cells(),
@@ -126,8 +121,7 @@ impl StudyFolder {
         let text = fs::read_to_string(&file).map_err(io_error("read", &file))?;
         let [first, last] = record.seeds;
         let study = Study::from_toml(&text, &record.source, Some(RangeInclusive::new(first, last)))?;
-        let held = Identity { study: record.study, sha256: record.study_sha256, version: record.version };
-        if let Some(difference) = held.difference(&Identity::of(&study)) {
+        if let Some(difference) = record.identity.difference(&Identity::of(&study)) {
             return Err(Error::Parse {
                 path: path.join(RECORD),
                 message: format!("the rows are of {difference}: the study's world or this program has changed since"),
@@ -236,8 +230,7 @@ impl StudyFolder {
     /// When it is of another study or version, or its rows cannot be read.
     pub fn take(&self, other: &Path) -> Result<()> {
         let record = read_record(other)?;
-        let held = Identity { study: record.study, sha256: record.study_sha256, version: record.version };
-        if let Some(difference) = held.difference(&Identity::of(&self.study)) {
+        if let Some(difference) = record.identity.difference(&Identity::of(&self.study)) {
             return Err(Error::Unfit {
                 what: format!("shard {}", other.display()),
                 found: format!("rows of {difference}"),
@@ -304,9 +297,4 @@ fn read_record(path: &Path) -> Result<StudyRecord> {
     let file = path.join(RECORD);
     let text = fs::read(&file).map_err(io_error("read", &file))?;
     serde_json::from_slice(&text).map_err(|e| Error::Parse { path: file, message: e.to_string() })
-}
-
-/// Whether a file in a study's folder is one of its report's.
-fn is_report(name: &str) -> bool {
-    name == "report"
 }
