@@ -15,10 +15,9 @@ use super::simulation::Simulation;
 use super::summary::{CollisionRecord, PoseRecord};
 use crate::error::{Error, Result};
 use crate::geometry::{Pose, Twist, wrap};
-use crate::observation::{Bearing, HomeSnapshot};
 use crate::physics::{Collision, Plant, WheelState};
 use crate::random::Seed;
-use crate::sensor::Sensor;
+use crate::sensor::Blind;
 use crate::world::World;
 
 /// Columns of a command table, in any order.
@@ -202,24 +201,6 @@ fn state(simulation: &Simulation<'_>, time_s: f64, command: Twist) -> DriveStep 
         odometry: Twist::default(),
         wheels: simulation.plant().and_then(Plant::wheels).unwrap_or_default(),
         collisions: simulation.collisions().len() as u32,
-    }
-}
-
-/// A robot that looks at nothing.
-#[derive(Default)]
-struct Blind(HomeSnapshot);
-
-impl Sensor for Blind {
-    fn reset(&mut self, _seed: Seed) -> Result<()> {
-        Ok(())
-    }
-
-    fn home(&self) -> &HomeSnapshot {
-        &self.0
-    }
-
-    fn observe(&mut self, _truth: Pose, _bodies: &[Pose]) -> Result<Vec<Bearing>> {
-        Ok(Vec::new())
     }
 }
 

@@ -574,8 +574,8 @@ mod tests {
     use super::super::setup::SensorKind;
     use super::super::setup::Start;
     use super::*;
-    use crate::observation::HomeSnapshot;
     use crate::physics::PlantStep;
+    use crate::sensor::Blind;
 
     /// Moves as told along a line, short of a wall; coasts for one period after the command ends.
     struct Track {
@@ -596,20 +596,6 @@ mod tests {
         }
         fn body_poses(&self) -> &[Pose] {
             &[]
-        }
-    }
-
-    struct Blind(HomeSnapshot);
-
-    impl Sensor for Blind {
-        fn reset(&mut self, _: Seed) -> Result<()> {
-            Ok(())
-        }
-        fn home(&self) -> &HomeSnapshot {
-            &self.0
-        }
-        fn observe(&mut self, _: Pose, _: &[Pose]) -> Result<Vec<Bearing>> {
-            Ok(Vec::new())
         }
     }
 
@@ -637,7 +623,7 @@ mod tests {
 
     fn parts<'a>(wall_x: f64) -> Parts<'a> {
         let plant = move |pose, _| -> Box<dyn Plant> { Box::new(Track { pose, wall_x, last_v: 0.0 }) };
-        Parts { plant: Box::new(plant), sensor: Box::new(Blind(HomeSnapshot::default())) }
+        Parts { plant: Box::new(plant), sensor: Box::new(Blind::default()) }
     }
 
     fn run(wall_x: f64, script: Script, watch: &mut Watch<'_>) -> Result<Record> {

@@ -162,9 +162,6 @@ mod tests {
     }
 
     impl Sensor for Carousel {
-        fn reset(&mut self, _: Seed) -> Result<()> {
-            Ok(())
-        }
         fn home(&self) -> &HomeSnapshot {
             &self.0
         }

@@ -5,7 +5,6 @@ use super::sight::hidden;
 use crate::error::Result;
 use crate::geometry::{Pose, angle_of};
 use crate::observation::{Bearing, HomeSnapshot, LandmarkId};
-use crate::random::Seed;
 use crate::world::World;
 
 /// Standard deviation that the sensor states for its exact bearings, rad: small, and not zero, for the sake of filters.
@@ -30,10 +29,6 @@ impl<'a> IdealSensor<'a> {
 }
 
 impl Sensor for IdealSensor<'_> {
-    fn reset(&mut self, _seed: Seed) -> Result<()> {
-        Ok(())
-    }
-
     fn home(&self) -> &HomeSnapshot {
         &self.home
     }

@@ -47,42 +47,27 @@ impl Evidence {
     }
 
     /// Table I's runs.
-    ///
-    /// # Errors
-    /// As [`Course::runs`].
-    pub fn table_one(&self) -> Result<&Vec<Run>> {
+    pub(crate) fn table_one(&self) -> Result<&Vec<Run>> {
         made(&self.table_one, || self.ideal.runs(&Variant::default()))
     }
 
     /// Experiments on the ideal setting.
-    ///
-    /// # Errors
-    /// As [`claims`].
-    pub fn claims(&self) -> Result<&Claims> {
+    pub(crate) fn claims(&self) -> Result<&Claims> {
         made(&self.claims, || claims(&self.ideal))
     }
 
     /// Observability in the ideal setting, driving towards home.
-    ///
-    /// # Errors
-    /// As [`map`].
-    pub fn homeward(&self) -> Result<&ObservabilityMap> {
+    pub(crate) fn homeward(&self) -> Result<&ObservabilityMap> {
         made(&self.homeward, || map(&self.world, Facing::Homeward, MAP_SPACING_M))
     }
 
     /// The same, facing along x everywhere.
-    ///
-    /// # Errors
-    /// As [`map`].
-    pub fn east(&self) -> Result<ObservabilityMap> {
+    pub(crate) fn east(&self) -> Result<ObservabilityMap> {
         map(&self.world, Facing::Heading(0.0), MAP_SPACING_M)
     }
 
     /// A set of images.
-    ///
-    /// # Errors
-    /// As [`ImageCase::new`].
-    pub fn set(&self, set: ImageSet) -> Result<&SetEvidence> {
+    pub(crate) fn set(&self, set: ImageSet) -> Result<&SetEvidence> {
         made(&self.sets[set as usize], || {
             let case = ImageCase::new(set, self.dataset.as_deref())?;
             Ok(SetEvidence { case, runs: OnceCell::new(), claims: OnceCell::new(), contests: OnceCell::new() })
@@ -101,26 +86,17 @@ pub struct SetEvidence {
 
 impl SetEvidence {
     /// The runs of its table.
-    ///
-    /// # Errors
-    /// As [`Course::runs`].
-    pub fn runs(&self) -> Result<&Vec<Run>> {
+    pub(crate) fn runs(&self) -> Result<&Vec<Run>> {
         made(&self.runs, || self.case.runs(&Variant::of_images()))
     }
 
     /// Experiments on it.
-    ///
-    /// # Errors
-    /// As [`image_claims`].
-    pub fn claims(&self) -> Result<&ImageClaims> {
+    pub(crate) fn claims(&self) -> Result<&ImageClaims> {
         made(&self.claims, || image_claims(&self.case))
     }
 
     /// Fig. 8 on it: with bearings from images, and from points.
-    ///
-    /// # Errors
-    /// As [`contest`].
-    pub fn contests(&self) -> Result<&[Contest; 2]> {
+    pub(crate) fn contests(&self) -> Result<&[Contest; 2]> {
         made(&self.contests, || Ok([contest(&self.case, Source::Images)?, contest(&self.case, Source::Points)?]))
     }
 }

@@ -10,7 +10,6 @@ use crate::error::Result;
 use crate::geometry::{Pose, Twist, wrap};
 use crate::method::MethodKind;
 use crate::observation::{Bearing, Estimate, HomeSnapshot};
-use crate::random::Seed;
 use crate::sensor::Sensor;
 use crate::world::{TaskSpec, World};
 
@@ -128,11 +127,6 @@ pub struct Eyes<'a> {
 }
 
 impl Sensor for Eyes<'_> {
-    /// The noise is drawn where the eyes are made.
-    fn reset(&mut self, _seed: Seed) -> Result<()> {
-        Ok(())
-    }
-
     fn home(&self) -> &HomeSnapshot {
         &self.home
     }
