@@ -3,7 +3,7 @@
 //! All rays of a column lie in one upright plane, so what they meet is a matter of two dimensions: a wall is a line, a body an
 //! interval of horizontal distance. The rows only decide which of these hits each ray sees.
 
-use super::frame::{Body, Edge, FAR, Frame};
+use super::records::{Body, Edge, FAR, Params};
 
 /// Greatest number of hits kept in a column, the wall included. Where a ray would meet more bodies before a wall, those
 /// farthest away are left out; what stands behind fifteen others is as good as never seen.
@@ -63,13 +63,12 @@ pub(super) fn hit_wall(edge: &Edge, k: u32, direction: [f32; 2]) -> Option<Hit> 
     met.then(|| Hit { near, far: near, normal: edge.normal, u: edge.u + along, surface: 2 + k, ..*Hit::NONE })
 }
 
-/// The rays' hit on a body, if they meet it; `None` also where the camera is inside its solid.
+/// The rays' hit on body `k`, if they meet it; `None` also where the camera is inside its solid.
 #[inline(always)]
-pub(super) fn hit_body(frame: &Frame, k: u32, direction: [f32; 2]) -> Option<Hit> {
-    let body = &frame.bodies[k as usize];
-    let hit = if body.radius > 0.0 { hit_disc(body, direction) } else { hit_polygon(frame, body, direction) }?;
-    let inside = hit.near <= 0.0 && body.bottom <= frame.params.camera_height && frame.params.camera_height <= body.top;
-    let surface = 2 + frame.params.wall_count + k;
+pub(super) fn hit_body(body: &Body, k: u32, edges: &[Edge], params: &Params, direction: [f32; 2]) -> Option<Hit> {
+    let hit = if body.radius > 0.0 { hit_disc(body, direction) } else { hit_polygon(edges, body, direction) }?;
+    let inside = hit.near <= 0.0 && body.bottom <= params.camera_height && params.camera_height <= body.top;
+    let surface = 2 + params.wall_count + k;
     (!inside).then_some(Hit { near: hit.near.max(0.0), bottom: body.bottom, top: body.top, surface, ..hit })
 }
 
@@ -95,10 +94,10 @@ fn hit_disc(body: &Body, direction: [f32; 2]) -> Option<Hit> {
 }
 
 #[inline(always)]
-fn hit_polygon(frame: &Frame, body: &Body, direction: [f32; 2]) -> Option<Hit> {
+fn hit_polygon(edges: &[Edge], body: &Body, direction: [f32; 2]) -> Option<Hit> {
     let first = body.first_edge as usize;
     let (mut near, mut far, mut entry) = (-FAR, FAR, first);
-    for (k, edge) in frame.edges.iter().enumerate().skip(first).take(body.edge_count as usize) {
+    for (k, edge) in edges.iter().enumerate().skip(first).take(body.edge_count as usize) {
         let facing = dot(edge.normal, direction);
         if facing == 0.0 {
             if edge.distance < 0.0 {
@@ -118,7 +117,7 @@ fn hit_polygon(frame: &Frame, body: &Body, direction: [f32; 2]) -> Option<Hit> {
     if near >= far || far <= 0.0 {
         return None;
     }
-    let edge = &frame.edges[entry];
+    let edge = &edges[entry];
     let along = near * dot(edge.tangent, direction) - edge.along;
     Some(Hit { near, far, normal: edge.normal, u: edge.u + along, ..*Hit::NONE })
 }

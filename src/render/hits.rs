@@ -6,7 +6,8 @@
 use std::ops::Range;
 
 use super::columns::{Hit, MAX_HITS, hit_body, hit_wall};
-use super::frame::{Edge, FAR, Frame};
+use super::frame::Frame;
+use super::records::{Edge, FAR};
 use crate::geometry::{Vector2, atan2, cross};
 
 /// The hits of every column, nearest first.
@@ -45,9 +46,9 @@ impl ColumnHits {
                 }
             }
         }
-        for k in 0..frame.bodies.len() {
+        for (k, body) in frame.bodies.iter().enumerate() {
             for column in body_span(frame, k) {
-                if let Some(hit) = hit_body(frame, k as u32, frame.directions[column]) {
+                if let Some(hit) = hit_body(body, k as u32, &frame.edges, &frame.params, frame.directions[column]) {
                     self.insert(column, hit, wall_count as u32);
                 }
             }

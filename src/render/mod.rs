@@ -32,6 +32,7 @@ mod huge_pages;
 mod inner;
 mod instructions;
 mod now;
+mod records;
 mod sample;
 mod scene;
 mod shade;

@@ -1,6 +1,6 @@
 //! What the columns show in the row at work, and the row's ranges and instances that follow. Both renderers end with this.
 
-use super::frame::{FAR, Row};
+use super::records::{FAR, Row};
 
 /// What the distance of a face is told in.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

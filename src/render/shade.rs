@@ -6,7 +6,8 @@
 
 use super::Scene;
 use super::columns::Hit;
-use super::frame::{Edge, Frame, Lamp, Row};
+use super::frame::Frame;
+use super::records::{Edge, Lamp, Row};
 use super::sample::{
     LANES, POINTS, PointRoom, Points, RUN, Strip, StripPlaces, StripRoom, Strips, footprint, is_wanted, level, shade_point,
     within_tile, wrapped,

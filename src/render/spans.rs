@@ -8,8 +8,9 @@
 use std::ops::Range;
 
 use super::columns::{Face, Hit};
-use super::frame::{FAR, Frame, Row};
+use super::frame::Frame;
 use super::hits::ColumnHits;
+use super::records::{FAR, Row};
 
 /// Rows that show the same face.
 #[derive(Debug, Clone, Copy, PartialEq)]

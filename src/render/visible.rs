@@ -6,7 +6,7 @@
 //! same picture as all walls would.
 
 use super::columns::{angle, hit_wall};
-use super::frame::{Edge, FAR};
+use super::records::{Edge, FAR};
 use crate::geometry::Vector2;
 
 /// Up to this many walls and blocks a room is not worth a tree.

@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use super::gpu_error;
 use crate::error::{Error, Result};
 use crate::render::RendererInfo;
-use crate::render::frame::Params;
+use crate::render::records::Params;
 
 /// The compute shader: `shaders/columns.wgsl`, `spans.wgsl`, `sample.wgsl`, `shade.wgsl` and `panorama.wgsl`, one after the other.
 pub const SHADER: &str = concat!(

@@ -15,7 +15,8 @@ use picture::{PIXEL_BYTES, Unpacker, bytes_of};
 use tables::{Table, Texels};
 use tiles::{LAYER_TILES, TILE, tile};
 
-use super::frame::{Frame, Row};
+use super::frame::Frame;
+use super::records::Row;
 use super::{Renderer, RendererInfo, Scene, View};
 use crate::error::{Error, Result};
 use crate::panorama::Panorama;

@@ -7,8 +7,8 @@ use super::gpu_error;
 use crate::error::Result;
 use crate::panorama::{INSTANCE_CEILING, INSTANCE_FLOOR, Panorama, Projection};
 use crate::render::columns::MAX_HITS;
-use crate::render::frame::Row;
 use crate::render::now::{Now, Shown, Unit};
+use crate::render::records::Row;
 
 /// Bytes that the shader writes for a pixel.
 pub(super) const PIXEL_BYTES: u64 = 4;
