@@ -6,10 +6,22 @@ use crate::geometry::Vector2;
 /// Lower left and upper right corner of a box, m.
 pub(crate) type Bounds = (Vector2<f64>, Vector2<f64>);
 
+/// Lower left and upper right corner of the bounding box of some points. No points give an inverted, infinite box.
+#[must_use]
+pub fn bounds(points: &[Vector2<f64>]) -> (Vector2<f64>, Vector2<f64>) {
+    let mut low = Vector2::new(f64::INFINITY, f64::INFINITY);
+    let mut high = -low;
+    for p in points {
+        low = Vector2::new(low.x.min(p.x), low.y.min(p.y));
+        high = Vector2::new(high.x.max(p.x), high.y.max(p.y));
+    }
+    (low, high)
+}
+
 /// The bounding box of some points, grown by `margin_m` on all sides.
 pub(crate) fn bounds_of(points: &[Vector2<f64>], margin_m: f64) -> Bounds {
     let margin = Vector2::repeat(margin_m);
-    let (low, high) = super::polygon::bounds(points);
+    let (low, high) = bounds(points);
     (low - margin, high + margin)
 }
 
@@ -35,7 +47,7 @@ impl Grid {
         if corners.is_empty() || corners.iter().any(|c| !(c.x.is_finite() && c.y.is_finite())) {
             return Self::default();
         }
-        let (low, high) = super::polygon::bounds(&corners);
+        let (low, high) = bounds(&corners);
         let size = high - low;
         let most = (CELLS_PER_BOX * boxes.len() as f64).max(1.0);
         // Cells are square, and never so many that a long and narrow room has more of them than things.

@@ -4,6 +4,7 @@
 //! the corners does not matter. These are plain loops over all
 //! corners; [`super::Boundary`] answers the same for rooms of thousands.
 
+pub use super::grid::bounds;
 use super::grid::{Grid, bounds_of};
 use crate::geometry::{Vector2, cross};
 
@@ -28,18 +29,6 @@ pub fn anticlockwise(corners: &[[f64; 2]]) -> Vec<Vector2<f64>> {
         corners[1..].reverse();
     }
     corners
-}
-
-/// Lower left and upper right corner of the bounding box. An empty polygon gives an inverted, infinite box.
-#[must_use]
-pub fn bounds(polygon: &[Vector2<f64>]) -> (Vector2<f64>, Vector2<f64>) {
-    let mut low = Vector2::new(f64::INFINITY, f64::INFINITY);
-    let mut high = -low;
-    for p in polygon {
-        low = Vector2::new(low.x.min(p.x), low.y.min(p.y));
-        high = Vector2::new(high.x.max(p.x), high.y.max(p.y));
-    }
-    (low, high)
 }
 
 /// Whether `point` lies inside (even-odd rule). A point exactly on the boundary may count as either.
