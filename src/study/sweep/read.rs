@@ -1,4 +1,4 @@
-//! Reading a study file: its tree becomes a study, or all of its faults come at once.
+//! Study files: what a person writes, read and checked as a whole before anything runs; all faults come at once.
 
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
@@ -15,8 +15,98 @@ use crate::error::{Error, Result};
 use crate::fault::Fault;
 use crate::render::RendererChoice;
 
+/// Studies that the program carries with it, as (name, TOML text).
+const BUILTIN: [(&str, &str); 6] = [
+    ("slip-occlusion", include_str!("../../../worlds/studies/slip-occlusion.toml")),
+    ("wet-hall", include_str!("../../../worlds/studies/wet-hall.toml")),
+    ("light-camera", include_str!("../../../worlds/studies/light-camera.toml")),
+    ("faults-sobol", include_str!("../../../worlds/studies/faults-sobol.toml")),
+    ("robustness", include_str!("../../../worlds/studies/robustness.toml")),
+    ("rooms", include_str!("../../../worlds/studies/rooms.toml")),
+];
+
+impl Study {
+    /// Opens a study by what a person typed: the path of a file if there is one, else the name of a built-in study. `seeds`
+    /// replaces the file's.
+    ///
+    /// # Errors
+    /// When there is neither, the file cannot be read, or it has faults; all that can be found at once come at once.
+    pub fn open(argument: &str, seeds: Option<RangeInclusive<u64>>) -> Result<Self> {
+        let path = Path::new(argument);
+        if path.is_file() {
+            let text =
+                std::fs::read_to_string(path).map_err(|source| Error::Io { action: "read", path: path.to_owned(), source })?;
+            return Self::from_toml(&text, path, seeds);
+        }
+        let bare = argument.strip_prefix("worlds/studies/").unwrap_or(argument);
+        let bare = bare.strip_suffix(".toml").unwrap_or(bare);
+        match BUILTIN.iter().find(|(name, _)| *name == bare) {
+            Some((name, text)) => Self::from_toml(text, Path::new(&format!("builtin:{name}")), seeds),
+            None => Err(Error::Invalid {
+                what: "study".into(),
+                found: format!("{argument}, which is no file"),
+                allowed: format!("a study file, or a built-in study: {}", Self::builtin_names().join(", ")),
+            }),
+        }
+    }
+
+    /// Names of the built-in studies.
+    pub fn builtin_names() -> Vec<&'static str> {
+        BUILTIN.iter().map(|(name, _)| *name).collect()
+    }
+
+    /// Checks a study given as text. `source` names it in messages; a world is looked for in its folder, too.
+    ///
+    /// # Errors
+    /// As [`Study::open`].
+    pub fn from_toml(text: &str, source: &Path, seeds: Option<RangeInclusive<u64>>) -> Result<Self> {
+        let tree = Node::from_toml(text, source)?;
+        let study = Reader::new(source).read(&tree, text, seeds)?;
+        study.check(&tree, source)?;
+        Ok(study)
+    }
+
+    /// Sets every level of every axis once, beside the first levels of the others.
+    fn check(&self, tree: &Node, source: &Path) -> Result<()> {
+        let mut first = self.values(0);
+        if self.design == Design::OneAtATime {
+            let others = (0..first.len()).filter(|k| Some(*k) != self.compared());
+            others.for_each(|k| first[k] = Value::Unset);
+        }
+        let try_out = |values: &[Value]| self.case(values, *self.seeds.start()).and_then(|(_, setup)| setup.check());
+        if let Err(error) = try_out(&first) {
+            let line = self.axes.iter().zip(0..).find_map(|(axis, k)| {
+                let named = matches!(&error, Error::Invalid { what, .. } if *what == axis.setting);
+                named.then(|| tree.locate(&format!("axes[{k}]")).0)
+            });
+            return Err(at_place(source, "the study's settings", line.flatten(), &error));
+        }
+        for (k, axis) in self.axes.iter().enumerate() {
+            let levels = match &axis.levels {
+                Levels::Listed(values) => values.clone(),
+                Levels::Between { low, high, .. } => vec![Value::Real(*low), Value::Real(*high)],
+            };
+            for level in levels {
+                let mut values = first.clone();
+                values[k] = level.clone();
+                if let Err(error) = try_out(&values) {
+                    let line = tree.locate(&format!("axes[{k}].values")).0;
+                    return Err(at_place(source, &format!("axis {} at {level}", axis.setting), line, &error));
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+fn at_place(source: &Path, place: &str, line: Option<usize>, error: &Error) -> Error {
+    let line = line.map_or_else(String::new, |line| format!("line {line}: "));
+    let cause = std::error::Error::source(error).map_or_else(String::new, |cause| format!(": {cause}"));
+    Error::Parse { path: source.to_owned(), message: format!("{line}{place}: {error}{cause}") }
+}
+
 /// Reads the file's tree and gathers its faults.
-pub(super) struct Reader<'a> {
+struct Reader<'a> {
     source: &'a Path,
     faults: Vec<Fault>,
 }
@@ -26,7 +116,7 @@ const FIELDS: [&str; 10] = ["name", "description", "world", "seed", "seeds", "de
 const AXIS_FIELDS: [&str; 6] = ["setting", "label", "values", "from", "to", "scale"];
 
 impl<'a> Reader<'a> {
-    pub fn new(source: &'a Path) -> Self {
+    fn new(source: &'a Path) -> Self {
         Self { source, faults: Vec::new() }
     }
 
@@ -34,7 +124,7 @@ impl<'a> Reader<'a> {
     ///
     /// # Errors
     /// All faults that can be found at once.
-    pub fn read(mut self, tree: &Node, text: &str, seeds: Option<RangeInclusive<u64>>) -> Result<Study> {
+    fn read(mut self, tree: &Node, text: &str, seeds: Option<RangeInclusive<u64>>) -> Result<Study> {
         match self.study(tree, text, seeds) {
             Some(study) if self.faults.is_empty() => Ok(study),
             _ => Err(self.error()),

@@ -1,18 +1,15 @@
-//! Study files: what a person writes, checked as a whole before anything runs.
+//! A study: what its cells and episodes are, and what each of them is set to.
 
 use std::ops::RangeInclusive;
-use std::path::Path;
 
 use serde::Serialize;
 use sha2::{Digest, Sha256};
 
 use super::design::{self, Design};
-use super::read::Reader;
 use super::settings::{self, Case};
 use super::value::Value;
-use crate::document::Node;
 use crate::episode::Setup;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::random::Seed;
 use crate::world::{Draft, World};
 
@@ -20,16 +17,6 @@ use crate::world::{Draft, World};
 pub const MOST_EPISODES: u64 = 100_000_000;
 /// Most episodes in one chunk, the unit in which a study is run, stored and resumed.
 const CHUNK_EPISODES: u64 = 20;
-/// Studies that the program carries with it, as (name, TOML text).
-const BUILTIN: [(&str, &str); 6] = [
-    ("slip-occlusion", include_str!("../../../worlds/studies/slip-occlusion.toml")),
-    ("wet-hall", include_str!("../../../worlds/studies/wet-hall.toml")),
-    ("light-camera", include_str!("../../../worlds/studies/light-camera.toml")),
-    ("faults-sobol", include_str!("../../../worlds/studies/faults-sobol.toml")),
-    ("robustness", include_str!("../../../worlds/studies/robustness.toml")),
-    ("rooms", include_str!("../../../worlds/studies/rooms.toml")),
-];
-
 /// A setting that a study varies.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Axis {
@@ -124,46 +111,6 @@ pub struct Chunk {
 }
 
 impl Study {
-    /// Opens a study by what a person typed: the path of a file if there is one, else the name of a built-in study. `seeds`
-    /// replaces the file's.
-    ///
-    /// # Errors
-    /// When there is neither, the file cannot be read, or it has faults; all that can be found at once come at once.
-    pub fn open(argument: &str, seeds: Option<RangeInclusive<u64>>) -> Result<Self> {
-        let path = Path::new(argument);
-        if path.is_file() {
-            let text =
-                std::fs::read_to_string(path).map_err(|source| Error::Io { action: "read", path: path.to_owned(), source })?;
-            return Self::from_toml(&text, path, seeds);
-        }
-        let bare = argument.strip_prefix("worlds/studies/").unwrap_or(argument);
-        let bare = bare.strip_suffix(".toml").unwrap_or(bare);
-        match BUILTIN.iter().find(|(name, _)| *name == bare) {
-            Some((name, text)) => Self::from_toml(text, Path::new(&format!("builtin:{name}")), seeds),
-            None => Err(Error::Invalid {
-                what: "study".into(),
-                found: format!("{argument}, which is no file"),
-                allowed: format!("a study file, or a built-in study: {}", Self::builtin_names().join(", ")),
-            }),
-        }
-    }
-
-    /// Names of the built-in studies.
-    pub fn builtin_names() -> Vec<&'static str> {
-        BUILTIN.iter().map(|(name, _)| *name).collect()
-    }
-
-    /// Checks a study given as text. `source` names it in messages; a world is looked for in its folder, too.
-    ///
-    /// # Errors
-    /// As [`Study::open`].
-    pub fn from_toml(text: &str, source: &Path, seeds: Option<RangeInclusive<u64>>) -> Result<Self> {
-        let tree = Node::from_toml(text, source)?;
-        let study = Reader::new(source).read(&tree, text, seeds)?;
-        study.check(&tree, source)?;
-        Ok(study)
-    }
-
     /// Names the study and everything that decides about its rows, this program's version included: rows of studies with equal
     /// hashes belong together.
     pub fn sha256(&self) -> String {
@@ -332,42 +279,4 @@ impl Study {
         }
         Ok((case.draft.world()?, case.setup))
     }
-
-    /// Sets every level of every axis once, beside the first levels of the others.
-    fn check(&self, tree: &Node, source: &Path) -> Result<()> {
-        let mut first = self.values(0);
-        if self.design == Design::OneAtATime {
-            let others = (0..first.len()).filter(|k| Some(*k) != self.compared());
-            others.for_each(|k| first[k] = Value::Unset);
-        }
-        let try_out = |values: &[Value]| self.case(values, *self.seeds.start()).and_then(|(_, setup)| setup.check());
-        if let Err(error) = try_out(&first) {
-            let line = self.axes.iter().zip(0..).find_map(|(axis, k)| {
-                let named = matches!(&error, Error::Invalid { what, .. } if *what == axis.setting);
-                named.then(|| tree.locate(&format!("axes[{k}]")).0)
-            });
-            return Err(at_place(source, "the study's settings", line.flatten(), &error));
-        }
-        for (k, axis) in self.axes.iter().enumerate() {
-            let levels = match &axis.levels {
-                Levels::Listed(values) => values.clone(),
-                Levels::Between { low, high, .. } => vec![Value::Real(*low), Value::Real(*high)],
-            };
-            for level in levels {
-                let mut values = first.clone();
-                values[k] = level.clone();
-                if let Err(error) = try_out(&values) {
-                    let line = tree.locate(&format!("axes[{k}].values")).0;
-                    return Err(at_place(source, &format!("axis {} at {level}", axis.setting), line, &error));
-                }
-            }
-        }
-        Ok(())
-    }
-}
-
-fn at_place(source: &Path, place: &str, line: Option<usize>, error: &Error) -> Error {
-    let line = line.map_or_else(String::new, |line| format!("line {line}: "));
-    let cause = std::error::Error::source(error).map_or_else(String::new, |cause| format!(": {cause}"));
-    Error::Parse { path: source.to_owned(), message: format!("{line}{place}: {error}{cause}") }
 }
