@@ -2,8 +2,8 @@
 
 use std::fmt::Write;
 
+use crate::statistics::mean;
 use crate::study::bound::{Bound, BoundRow, Consistency, nees_band};
-use crate::study::statistics::mean;
 
 /// Bounds above these say only that nothing is known yet: R (m), theta and alpha (rad).
 const NOTHING_KNOWN: [f64; 3] = [10.0, 1.0, 1.0];

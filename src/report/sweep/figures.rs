@@ -2,9 +2,9 @@
 
 use super::heat::{Cell, heat};
 use crate::report::curves::{Curve, Unit, WIDTH_PX, curves, document};
+use crate::statistics::Paired;
 use crate::storage::csv::{Columns, csv_with, number};
 use crate::study::row::Ending;
-use crate::study::statistics::Paired;
 use crate::study::sweep::duels::{Duel, Scale, duels};
 use crate::study::sweep::{Design, Row, Study};
 use crate::study::tally::Tally;

@@ -6,7 +6,7 @@ use super::figures::{Figure, Section, Sums};
 use super::gallery::pictures;
 use crate::command_line::command_line;
 use crate::study::sweep::store::Rate;
-use crate::study::sweep::{Design, Exhibit};
+use crate::study::sweep::{Design, Exhibit, Row};
 use crate::study::tally::{OutcomeCounts, Tally};
 
 const STYLE: &str = include_str!("page.css");
@@ -70,38 +70,25 @@ impl Page<'_> {
         let words =
             format!("Percent of runs that claimed to be home and came to rest within the arrival radius of it{below}.{pooled}");
         self.section(text, Section::Success, "Who comes home", &words);
-        let names = self.sums.names();
-        *text += "<div class=\"scroll\"><table>\n<tr><th></th><th>runs</th><th>home</th><th>95 %</th><th>wrong claims</th>";
-        for (other, _) in OutcomeCounts::default().others() {
-            let _ = write!(text, "<th>{other}</th>");
-        }
-        *text += "<th>time ratio</th><th>final distance</th></tr>\n";
-        for (level, name) in names.iter().enumerate() {
-            let rows = self.sums.rows.iter();
+        let number = |v: Option<f64>, scale: f64, unit: &str| {
+            v.map_or_else(|| "\u{2013}".to_owned(), |v| format!("{:.2}{unit}", scale * v))
+        };
+        let rows = self.sums.names().into_iter().enumerate().map(|(level, name)| {
             let scale = self.sums.compared.as_ref();
-            let rows = rows.filter(|row| scale.is_none_or(|scale| scale.level(self.sums.study, row) == Some(level)));
-            let t = Tally::of(rows.map(|row| &row.run));
-            let [low, high] = t.home_share_95;
-            let _ = write!(
-                text,
-                "<tr><td>{}</td><td>{}</td><td>{:.1} %</td><td>{:.1}\u{2013}{:.1}</td><td>{}</td>",
-                escaped(if name.is_empty() { "all" } else { name }),
-                t.runs,
-                100.0 * t.home_share,
-                100.0 * low,
-                100.0 * high,
-                t.wrong_claims
-            );
-            for (_, other) in t.outcomes.others() {
-                let _ = write!(text, "<td>{other}</td>");
-            }
-            let number = |v: Option<f64>, scale: f64, unit: &str| {
-                v.map_or_else(|| "\u{2013}".to_owned(), |v| format!("{:.2}{unit}", scale * v))
-            };
-            let (ratio, last) = (number(t.time_ratio.median, 1.0, ""), number(t.final_distance_m.median, 100.0, " cm"));
-            let _ = writeln!(text, "<td>{ratio}</td><td>{last}</td></tr>");
-        }
-        *text += "</table></div>\n<p class=\"faint\">Time ratio is time over straight-line time, the median of the runs that came \
+            let at = |row: &&Row| scale.is_none_or(|scale| scale.level(self.sums.study, row) == Some(level));
+            let t = Tally::of(self.sums.rows.iter().filter(at).map(|row| &row.run));
+            let [low, high] = t.home_share_95.map(|share| 100.0 * share);
+            let name = if name.is_empty() { "all".to_owned() } else { escaped(&name) };
+            let home =
+                [format!("{:.1} %", 100.0 * t.home_share), format!("{low:.1}\u{2013}{high:.1}"), t.wrong_claims.to_string()];
+            let others = t.outcomes.others().map(|(_, count)| count.to_string());
+            let last = [number(t.time_ratio.median, 1.0, ""), number(t.final_distance_m.median, 100.0, " cm")];
+            [&[name, t.runs.to_string()], &home[..], &others, &last].concat()
+        });
+        let others = OutcomeCounts::default().others().map(|(other, _)| other);
+        let head = [&["", "runs", "home", "95 %", "wrong claims"], &others[..], &["time ratio", "final distance"]].concat();
+        *text += &table("", &head, rows);
+        *text += "<p class=\"faint\">Time ratio is time over straight-line time, the median of the runs that came \
                   home; final distance is the median distance from home at the end of all runs.</p>\n";
     }
 
@@ -134,41 +121,25 @@ impl Page<'_> {
                      is a bootstrap over seeds (2000 draws of whole seeds, percentiles), because pairs of one seed in many cells \
                      are not independent; P is McNemar's mid-P, which ignores that.";
         self.section(text, Section::Pairs, "Paired differences", words);
-        *text += "<div class=\"scroll\"><table>\n<tr><th>pair</th><th>pairs</th><th>both home</th><th>only the first</th>\
-                  <th>only the second</th><th>neither</th><th>difference</th><th>95 %</th><th>P</th>\
-                  <th>difference of time ratios</th><th>95 %</th></tr>\n";
         let names = self.sums.names();
-        for duel in &self.sums.duels {
+        let signed = |value: f64, decimals: usize| format!("{value:+.decimals$}").replace('-', "\u{2212}");
+        let between = |[low, high]: [f64; 2], scale: f64, decimals| {
+            format!("{} to {}", signed(scale * low, decimals), signed(scale * high, decimals))
+        };
+        let rows = self.sums.duels.iter().map(|duel| {
             let [a, b] = duel.levels.map(|level| escaped(&names[level]));
             let all = duel.all;
-            let _ = write!(
-                text,
-                "<tr><td>{a} \u{2212} {b}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td>",
-                all.trials(),
-                all.both,
-                all.only_first,
-                all.only_second,
-                all.neither
-            );
-            let signed = |value: f64, decimals: usize| format!("{value:+.decimals$}").replace('-', "\u{2212}");
-            let (difference, [low, high]) = duel.success.unwrap_or((0.0, [-1.0, 1.0]));
-            let _ = write!(
-                text,
-                "<td>{} %</td><td>{} to {}</td><td>{}</td>",
-                signed(100.0 * difference, 1),
-                signed(100.0 * low, 1),
-                signed(100.0 * high, 1),
-                if all.mid_p() < 0.001 { "&lt; 0.001".to_owned() } else { format!("{:.3}", all.mid_p()) }
-            );
-            match duel.time_ratio {
-                Some((mean, [low, high])) => {
-                    let _ =
-                        writeln!(text, "<td>{}</td><td>{} to {}</td></tr>", signed(mean, 2), signed(low, 2), signed(high, 2));
-                }
-                None => *text += "<td>\u{2013}</td><td>\u{2013}</td></tr>\n",
-            }
-        }
-        *text += "</table></div>\n";
+            let counts = [all.trials(), all.both, all.only_first, all.only_second, all.neither].map(|count| count.to_string());
+            let (difference, interval) = duel.success.unwrap_or((0.0, [-1.0, 1.0]));
+            let p = if all.mid_p() < 0.001 { "&lt; 0.001".to_owned() } else { format!("{:.3}", all.mid_p()) };
+            let success = [format!("{} %", signed(100.0 * difference, 1)), between(interval, 100.0, 1), p];
+            let ratio = duel.time_ratio.map(|(mean, interval)| [signed(mean, 2), between(interval, 1.0, 2)]);
+            let ratio = ratio.unwrap_or_else(|| ["\u{2013}", "\u{2013}"].map(str::to_owned));
+            [&[format!("{a} \u{2212} {b}")], &counts[..], &success, &ratio].concat()
+        });
+        let counts = ["pair", "pairs", "both home", "only the first", "only the second", "neither"];
+        let head = [&counts[..], &["difference", "95 %", "P", "difference of time ratios", "95 %"]].concat();
+        *text += &table("", &head, rows);
     }
 
     fn gallery(&self, text: &mut String) {
@@ -202,12 +173,8 @@ impl Page<'_> {
             );
         }
         if !broken.is_empty() {
-            *text +=
-                "<div class=\"scroll\"><table class=\"words\">\n<tr><th>episodes without a result</th><th>reason</th></tr>\n";
-            for (reason, count) in broken.iter().take(20) {
-                let _ = writeln!(text, "<tr><td>{count}</td><td>{}</td></tr>", escaped(reason));
-            }
-            *text += "</table></div>\n";
+            let rows = broken.iter().take(20).map(|(reason, count)| [count.to_string(), escaped(reason)]);
+            *text += &table(" class=\"words\"", &["episodes without a result", "reason"], rows);
         }
     }
 
@@ -245,12 +212,23 @@ impl Page<'_> {
                 ),
             ));
         }
-        *text += "<h2>Settings and versions</h2>\n<div class=\"scroll\"><table class=\"words\">\n";
-        for (name, value) in rows {
-            let _ = writeln!(text, "<tr><td>{name}</td><td>{value}</td></tr>");
-        }
-        let _ = write!(text, "</table></div>\n<div class=\"scroll\"><pre>{}</pre></div>\n", escaped(&study.text));
+        let rows = rows.into_iter().map(|(name, value)| [name.to_owned(), value]);
+        *text += "<h2>Settings and versions</h2>\n";
+        *text += &table(" class=\"words\"", &[], rows);
+        let _ = write!(text, "<div class=\"scroll\"><pre>{}</pre></div>\n", escaped(&study.text));
     }
+}
+
+/// A table that scrolls by itself where it is wider than the page; cells are HTML.
+fn table(class: &str, head: &[&str], rows: impl Iterator<Item = impl AsRef<[String]>>) -> String {
+    let row = |tag: &str, cells: &[String]| {
+        let cells = cells.iter().map(|cell| format!("<{tag}>{cell}</{tag}>"));
+        format!("<tr>{}</tr>\n", cells.collect::<String>())
+    };
+    let head = head.iter().map(|&cell| cell.to_owned()).collect::<Vec<_>>();
+    let head = if head.is_empty() { String::new() } else { row("th", &head) };
+    let rows = rows.map(|cells| row("td", cells.as_ref())).collect::<String>();
+    format!("<div class=\"scroll\"><table{class}>\n{head}{rows}</table></div>\n")
 }
 
 /// What a million episodes take at a rate, in hours of one core.

@@ -12,6 +12,7 @@ use crate::draw::chart::{Axis, Chart, Mark, Stroke};
 use crate::draw::markdown::table;
 use crate::error::Result;
 use crate::storage::OutputFolder;
+use crate::storage::csv::{Columns, csv, number};
 
 /// Names of all files of the page. The table of OpenCV comes from outside and is kept as it is.
 pub const FILES: &[&str] = &[
@@ -36,7 +37,7 @@ pub const FILES: &[&str] = &[
 /// When a file cannot be written, or the table from outside is not what its script writes.
 pub fn write(mut folder: OutputFolder, study: &VisionStudy, command: &str) -> Result<()> {
     let detections = Detections::keep(&mut folder)?;
-    folder.write("vision.csv", csv(study).as_bytes())?;
+    folder.write("vision.csv", csv(COLUMNS, &study.levels).as_bytes())?;
     let figures = figures(study);
     for figure in &figures {
         folder.write(&figure.file, figure.chart.to_svg().as_bytes())?;
@@ -48,47 +49,33 @@ pub fn write(mut folder: OutputFolder, study: &VisionStudy, command: &str) -> Re
     folder.finish()
 }
 
-/// One row a level, empty cells where there is no number.
-fn csv(study: &VisionStudy) -> String {
-    let number = |value: Option<f64>| value.map_or_else(String::new, |v| v.to_string());
-    let row = |c: &LevelScore| {
-        let (degrees, px, sd) = (c.error_deg, c.error_px, c.error_sd);
-        [
-            ("world", c.world.clone()),
-            ("axis", c.factor.name().to_owned()),
-            ("level", c.label.clone()),
-            ("panoramas", c.panoramas.to_string()),
-            ("repeatability", c.repeatability.to_string()),
-            ("matches", c.matches.to_string()),
-            ("right", c.right.to_string()),
-            ("least_right", c.least_right.to_string()),
-            ("precision", c.precision.to_string()),
-            ("wrong", c.wrong.to_string()),
-            ("wrong_same_instance", c.wrong_same_instance.to_string()),
-            ("wrong_near", c.wrong_near.to_string()),
-            ("wrong_wild", c.wrong_wild.to_string()),
-            ("error_median_deg", number(degrees.map(|s| s.median))),
-            ("error_q95_deg", number(degrees.map(|s| s.q95))),
-            ("error_median_px", number(px.map(|s| s.median))),
-            ("error_q95_px", number(px.map(|s| s.q95))),
-            ("error_q68_sd", number(sd.map(|s| s.q68))),
-            ("error_q95_sd", number(sd.map(|s| s.q95))),
-            ("objects", c.objects.to_string()),
-            ("object_error_median_deg", number(c.object_error_deg.map(|s| s.median))),
-            ("object_error_q95_deg", number(c.object_error_deg.map(|s| s.q95))),
-            ("object_error_q68_sd", number(c.object_error_sd.map(|s| s.q68))),
-            ("object_error_q95_sd", number(c.object_error_sd.map(|s| s.q95))),
-        ]
-    };
-    let mut text = String::new();
-    for (k, cells) in study.levels.iter().map(row).enumerate() {
-        if k == 0 {
-            text += &(cells.each_ref().map(|(name, _)| *name).join(",") + "\n");
-        }
-        text += &(cells.map(|(_, value)| value).join(",") + "\n");
-    }
-    text
-}
+/// Columns of `vision.csv`: a row a level, empty cells where there is no number.
+const COLUMNS: &Columns<LevelScore> = &[
+    ("world", |c| c.world.clone()),
+    ("axis", |c| c.factor.name().to_owned()),
+    ("level", |c| c.label.clone()),
+    ("panoramas", |c| c.panoramas.to_string()),
+    ("repeatability", |c| c.repeatability.to_string()),
+    ("matches", |c| c.matches.to_string()),
+    ("right", |c| c.right.to_string()),
+    ("least_right", |c| c.least_right.to_string()),
+    ("precision", |c| c.precision.to_string()),
+    ("wrong", |c| c.wrong.to_string()),
+    ("wrong_same_instance", |c| c.wrong_same_instance.to_string()),
+    ("wrong_near", |c| c.wrong_near.to_string()),
+    ("wrong_wild", |c| c.wrong_wild.to_string()),
+    ("error_median_deg", |c| number(c.error_deg.map(|s| s.median))),
+    ("error_q95_deg", |c| number(c.error_deg.map(|s| s.q95))),
+    ("error_median_px", |c| number(c.error_px.map(|s| s.median))),
+    ("error_q95_px", |c| number(c.error_px.map(|s| s.q95))),
+    ("error_q68_sd", |c| number(c.error_sd.map(|s| s.q68))),
+    ("error_q95_sd", |c| number(c.error_sd.map(|s| s.q95))),
+    ("objects", |c| c.objects.to_string()),
+    ("object_error_median_deg", |c| number(c.object_error_deg.map(|s| s.median))),
+    ("object_error_q95_deg", |c| number(c.object_error_deg.map(|s| s.q95))),
+    ("object_error_q68_sd", |c| number(c.object_error_sd.map(|s| s.q68))),
+    ("object_error_q95_sd", |c| number(c.object_error_sd.map(|s| s.q95))),
+];
 
 fn of<'a>(study: &'a VisionStudy, world: &'a str, factor: Factor) -> impl Iterator<Item = &'a LevelScore> {
     study.levels.iter().filter(move |c| c.world == world && c.factor == factor)
