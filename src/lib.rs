@@ -71,7 +71,7 @@
 //! 4  sensor   method   dataset
 //! 3  physics   render   vision   estimation   control        draw     charts, maps, sheets
 //! 2  world   panorama_set   observation
-//! 1  panorama   document   fault   storage   table   command_line   error   geometry   ode   random
+//! 1  panorama   document   fault   storage   table   command_line   error   geometry   ode   random   statistics
 //! ```
 //!
 //! # Features
@@ -117,6 +117,7 @@ pub mod record;
 pub mod render;
 pub mod report;
 pub mod sensor;
+pub mod statistics;
 pub mod storage;
 pub mod study;
 pub mod table;

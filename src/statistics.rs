@@ -6,7 +6,7 @@ const Z_95: f64 = 1.959_963_984_540_054;
 /// 95 % interval of a share by Wilson's score method (1927): of `trials`, `successes` succeeded. All of [0, 1] without trials.
 ///
 /// ```
-/// let [low, high] = wayhome::study::statistics::wilson_95(38, 40);
+/// let [low, high] = wayhome::statistics::wilson_95(38, 40);
 /// assert!((low - 0.835).abs() < 5e-4 && (high - 0.986).abs() < 5e-4);
 /// ```
 pub fn wilson_95(successes: usize, trials: usize) -> [f64; 2] {
@@ -61,7 +61,7 @@ impl Paired {
     /// shares, joined by square and add with the correlation of the pairs. All of [-1, 1] without trials.
     ///
     /// ```
-    /// use wayhome::study::statistics::Paired;
+    /// use wayhome::statistics::Paired;
     ///
     /// // Airway hyper-responsiveness before and after transplantation (Bentur et al. 2009), as Fagerland et al. (2014) give it.
     /// let [low, high] = Paired { both: 1, only_first: 1, only_second: 7, neither: 12 }.difference_95();
@@ -151,7 +151,7 @@ pub fn quantile(values: &[f64], share: f64) -> Option<f64> {
 /// Crates for this (`statrs`, `puruspe`) take exponentials from the platform, whose last digits differ from machine to machine.
 ///
 /// ```
-/// let [low, high] = wayhome::study::statistics::chi_square_95(600.0);
+/// let [low, high] = wayhome::statistics::chi_square_95(600.0);
 /// assert!((low - 534.019).abs() < 1e-3 && (high - 669.769).abs() < 1e-3);
 /// ```
 pub fn chi_square_95(freedom: f64) -> [f64; 2] {

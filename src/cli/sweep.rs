@@ -10,7 +10,7 @@ use anyhow::Result;
 use serde::Serialize;
 use wayhome::Error;
 use wayhome::report::sweep as page;
-use wayhome::study::statistics::wilson_95;
+use wayhome::statistics::wilson_95;
 use wayhome::study::sweep::store::{Rate, StudyFolder};
 use wayhome::study::sweep::{Row, Setting, Study, catalogue, exhibits, run as run_chunks};
 

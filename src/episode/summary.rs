@@ -11,6 +11,7 @@ use crate::method::MethodKind;
 use crate::observation::Estimate;
 use crate::physics::Collision;
 use crate::render::RendererInfo;
+use crate::statistics::mean;
 use crate::world::{CameraPreset, LightPreset, World};
 
 /// An episode in numbers. Everything but `timing` (and the renderer's names) depends on the world, the settings and the seed
@@ -294,10 +295,4 @@ impl BeliefError {
             nees: Cholesky::new(estimate.covariance).map(|c| error.dot(&c.solve(&error))).filter(|n| n.is_finite()),
         }
     }
-}
-
-/// Mean of the values; `None` of none.
-fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
-    let (sum, count) = values.fold((0.0, 0_usize), |(sum, count), v| (sum + v, count + 1));
-    (count > 0).then(|| sum / count as f64)
 }

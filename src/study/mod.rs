@@ -10,6 +10,5 @@ pub mod pool;
 pub mod robustness;
 pub mod row;
 pub mod seeds;
-pub mod statistics;
 pub mod sweep;
 pub mod tally;

@@ -3,12 +3,12 @@
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::statistics::mean;
 use crate::error::{Error, Result};
 use crate::estimation::observability::{Observability, observability};
 use crate::geometry::{Pose, Vector2, angle_of, direction};
 use crate::random::Seed;
 use crate::sensor::{IdealSensor, Sensor};
+use crate::statistics::mean;
 use crate::world::World;
 use crate::world::polygon::{bounds, contains};
 

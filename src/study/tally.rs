@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::row::{Ending, RunRow};
-use super::statistics::{quantile, wilson_95};
+use crate::statistics::{quantile, wilson_95};
 
 /// Some runs in numbers.
 #[derive(Debug, Clone, PartialEq, Serialize)]

@@ -1,7 +1,6 @@
 //! The project held against closed forms, other programs and its own speed.
 //!
-//! Knows of: physics, renderer, extractor and data sets from outside, and drawing. Must not know of studies but for their
-//! statistics.
+//! Knows of: physics, renderer, extractor and data sets from outside, and drawing. Must not know of studies.
 
 pub mod dataset;
 #[cfg(feature = "rapier")]

@@ -4,7 +4,7 @@ use std::hint::black_box;
 use std::time::Instant;
 
 use crate::error::{Error, Result};
-use crate::study::statistics::quantile;
+use crate::statistics::quantile;
 
 /// Bytes whose filling is what memory allows.
 const FILLED_BYTES: usize = 256 << 20;

@@ -19,12 +19,12 @@ use std::ops::{ControlFlow, RangeInclusive};
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::statistics::{chi_square_95, mean};
 use crate::episode::Start;
 use crate::error::{Error, Result};
 use crate::estimation::anchored::FilterSettings;
 use crate::random::Seed;
 use crate::sensor::Noise;
+use crate::statistics::{chi_square_95, mean};
 use crate::world::World;
 use path::{Path, StepErrors};
 

@@ -11,7 +11,7 @@ use crate::estimation::paper::{PaperSettings, Prediction};
 use crate::geometry::{Vector2, angle_of, wrap};
 use crate::method::MethodKind;
 use crate::ode::Tolerance;
-use crate::study::statistics::{mean, quantile};
+use crate::statistics::{mean, quantile};
 
 /// Outcome of P1 to P4 under one law.
 #[derive(Debug, Clone, Copy, PartialEq)]

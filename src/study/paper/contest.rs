@@ -20,7 +20,7 @@ use crate::episode::Setup;
 use crate::error::Result;
 use crate::geometry::Pose;
 use crate::method::MethodKind;
-use crate::study::statistics::mean;
+use crate::statistics::mean;
 
 /// Ts of Fig. 8, s.
 const PERIOD_S: f64 = 0.01;

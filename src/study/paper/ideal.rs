@@ -7,7 +7,7 @@ use crate::estimation::observability::observability;
 use crate::geometry::{Pose, Vector2, angle_of, wrap};
 use crate::observation::{Bearing, HomeSnapshot, LandmarkId};
 use crate::random::{Seed, Stream, standard_normal};
-use crate::study::statistics::mean;
+use crate::statistics::mean;
 use crate::world::World;
 
 /// The setting: landmarks around home, and the world whose task the runs have.

@@ -12,7 +12,7 @@ use crate::geometry::{Vector2, direction, wrap};
 use crate::observation::{Bearing, HomeSnapshot, LandmarkId};
 use crate::panorama::Panorama;
 use crate::panorama_set::{Grid, Place};
-use crate::study::statistics::quantile;
+use crate::statistics::quantile;
 use crate::vision::{Extractor, ExtractorSettings, Match};
 
 /// Width of an object's strip, rad.

@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use super::rows::Row;
 use super::spec::{Axis, Levels, Study};
+use crate::statistics::{Paired, cluster_bootstrap_95};
 use crate::study::row::Ending;
-use crate::study::statistics::{Paired, cluster_bootstrap_95};
 
 /// Classes that the range of a sampled axis is cut into.
 const CLASSES: usize = 6;
