@@ -1,11 +1,17 @@
 //! The library's one error type.
 
+use std::ops::ControlFlow;
 use std::path::PathBuf;
 
 use crate::fault::Fault;
 
 /// Result of a fallible library call.
 pub type Result<T> = std::result::Result<T, Error>;
+
+/// Goes on, or is interrupted, as a watcher says.
+pub(crate) fn go_on(flow: ControlFlow<()>) -> Result<()> {
+    if flow.is_break() { Err(Error::Interrupted) } else { Ok(()) }
+}
 
 /// All that can go wrong in the library.
 #[derive(Debug, thiserror::Error)]

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::parts::{SUMS, if_there, read_record, record_names, walk};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, go_on};
 use crate::panorama_set::{DOCUMENT, Document};
 use crate::storage::{io_error, open_within, read_within, sha256_of_file};
 
@@ -100,9 +100,7 @@ pub fn check(folder: &Path, watch: &(dyn Fn(u64, u64) -> ControlFlow<()> + Sync)
     }
     let (looked, read, total) = (AtomicU64::new(0), AtomicU64::new(0), expected.len() as u64);
     let inspect = |(path, expected): (&String, &Expected)| -> Result<Option<SetFault>> {
-        if watch(looked.fetch_add(1, Ordering::Relaxed), total).is_break() {
-            return Err(Error::Interrupted);
-        }
+        go_on(watch(looked.fetch_add(1, Ordering::Relaxed), total))?;
         let full = folder.join(path);
         let kind = match if_there(open_within(folder, &full))? {
             None => Some(FaultKind::Missing),

@@ -16,7 +16,7 @@ use rayon::prelude::*;
 use super::parts::{FileRecord, Record, SetFolder, is_whole};
 use super::plan::{Part, Plan, Stage};
 use super::truth::{TrueMatch, Witness, json, tables};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, go_on};
 use crate::geometry::Twist;
 use crate::panorama::Panorama;
 use crate::panorama_set::{
@@ -108,9 +108,7 @@ impl Job<'_> {
         }
         let folder = SetFolder::claim(self.out, document, self.shard)?;
         let mut progress = Progress { done: all - missing, all };
-        if watch(progress).is_break() {
-            return Err(Error::Interrupted);
-        }
+        go_on(watch(progress))?;
         let mut rest = Record::default();
         for (k, stage) in plan.stages.iter().enumerate() {
             let set = first.take().map_or_else(|| self.prepare(stage, &base, renderer), Ok)?;
@@ -191,9 +189,7 @@ impl Job<'_> {
         std::thread::scope(|scope| {
             let writing = scope.spawn(move || self.write_parts(folder, parts, &receiver));
             let rendered = renderer.render_batch(&set.scene, &views, &mut |first, panoramas| {
-                if watch(*progress).is_break() {
-                    return Err(Error::Interrupted);
-                }
+                go_on(watch(*progress))?;
                 let numbered = panoramas.par_iter_mut().zip(&frames[first..]).with_max_len(1);
                 let encoded: Vec<Encoded> = numbered
                     .map_init(
@@ -218,7 +214,7 @@ impl Job<'_> {
             }
         })?;
         // Told once more when the last files are in their places.
-        if watch(*progress).is_break() { Err(Error::Interrupted) } else { Ok(()) }
+        go_on(watch(*progress))
     }
 
     /// The files of a frame. The panorama is left with its columns as the layout has them.

@@ -7,7 +7,6 @@ use std::ops::ControlFlow;
 use std::path::Path;
 
 use serde::Serialize;
-use sha2::{Digest, Sha256};
 
 use super::parts::Parts;
 use super::setup::{PlantKind, Setup, Start};
@@ -18,6 +17,7 @@ use crate::geometry::{Pose, Twist, wrap};
 use crate::physics::{Collision, Plant, WheelState};
 use crate::random::Seed;
 use crate::sensor::Blind;
+use crate::storage::{io_error, sha256};
 use crate::world::World;
 
 /// Columns of a command table, in any order.
@@ -45,8 +45,7 @@ impl Commands {
     /// # Errors
     /// When the file cannot be read, and as [`Commands::parse`].
     pub fn load(path: &Path) -> Result<Self> {
-        let text =
-            std::fs::read_to_string(path).map_err(|source| Error::Io { action: "read", path: path.to_owned(), source })?;
+        let text = std::fs::read_to_string(path).map_err(io_error("read", path))?;
         Self::parse(&text, path)
     }
 
@@ -57,7 +56,7 @@ impl Commands {
     /// begin at 0 or do not grow by at least a millisecond, or there are fewer than two rows. The message names line and field.
     pub fn parse(text: &str, source: &Path) -> Result<Self> {
         Self::parse_rows(text)
-            .map(|rows| Self { rows, sha256: Sha256::digest(text.as_bytes()).iter().map(|b| format!("{b:02x}")).collect() })
+            .map(|rows| Self { rows, sha256: sha256(text.as_bytes()) })
             .map_err(|message| Error::Parse { path: source.to_owned(), message })
     }
 

@@ -1,6 +1,7 @@
 //! What an episode leaves behind.
 
 use serde::Serialize;
+use strum::IntoStaticStr;
 
 use crate::geometry::{Pose, Twist};
 use crate::observation::Estimate;
@@ -9,8 +10,9 @@ use crate::physics::Collision;
 use crate::render::RendererInfo;
 
 /// How an episode ended.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, IntoStaticStr)]
 #[serde(rename_all = "lowercase")]
+#[strum(serialize_all = "lowercase")]
 pub enum Outcome {
     /// The method claimed to be home, and the robot came to rest within the arrival radius of home.
     Home,
@@ -25,18 +27,9 @@ pub enum Outcome {
 }
 
 impl Outcome {
-    /// All outcomes, in the order in which tables list them.
-    pub const ALL: [Self; 5] = [Self::Home, Self::Timeout, Self::Lost, Self::Stuck, Self::Failed];
-
     /// Lower-case name, as files have it.
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Home => "home",
-            Self::Timeout => "timeout",
-            Self::Lost => "lost",
-            Self::Stuck => "stuck",
-            Self::Failed => "failed",
-        }
+        self.into()
     }
 }
 
@@ -99,8 +92,9 @@ pub struct Step {
 }
 
 /// What a method with an estimate is about.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, IntoStaticStr)]
 #[serde(rename_all = "lowercase")]
+#[strum(serialize_all = "lowercase")]
 pub enum Belief {
     /// Home is not found yet.
     Searching,
@@ -113,11 +107,7 @@ pub enum Belief {
 impl Belief {
     /// Lower-case name, as files have it.
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Searching => "searching",
-            Self::Homing => "homing",
-            Self::Lost => "lost",
-        }
+        self.into()
     }
 
     /// The belief at each step; `None` while the robot coasts to rest, and all through for a method that never has an estimate.

@@ -9,7 +9,7 @@ use super::record::{Ending, Outcome, Pictures, Record, Step, Timing};
 use super::recorder::{Moment, Recorder};
 use super::setup::{Setup, StopRule};
 use super::summary::Summary;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, go_on};
 use crate::geometry::{Pose, Twist, wrap};
 use crate::method;
 use crate::observation::{Bearing, Briefing, Decision, Estimate, Method, Observation, Odometry, Status};
@@ -363,9 +363,7 @@ impl<'a> Simulation<'a> {
             self.note(&decision)?;
             let time_s = self.running()?.time_s(self.task.control_period_s);
             let progress = Progress { time_s, distance_m: self.distance_m(), estimate: decision.estimate };
-            if watch(&progress).is_break() {
-                return Err(Error::Interrupted);
-            }
+            go_on(watch(&progress))?;
             match (self.phase(), decision.status) {
                 (Phase::Reached, _) => break Ending::Reached,
                 (_, Status::Arrived) => break Ending::Claimed,

@@ -20,7 +20,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::episode::Start;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, go_on};
 use crate::estimation::anchored::FilterSettings;
 use crate::random::Seed;
 use crate::sensor::Noise;
@@ -274,7 +274,8 @@ pub fn bound(
         let way = path.way(Seed(seed));
         let errors = path.estimate(Seed(seed), &way)?;
         let bounds = (k < BOUND_RUNS).then(|| path.bounds(&way)).transpose()?;
-        if watch().is_break() { Err(Error::Interrupted) } else { Ok((errors, bounds)) }
+        go_on(watch())?;
+        Ok((errors, bounds))
     };
     let judged = seeds.clone().collect::<Vec<u64>>().into_par_iter().enumerate().map(judge).collect::<Result<Vec<_>>>()?;
     let (runs, bounds): (Vec<_>, Vec<_>) = judged.into_iter().unzip();

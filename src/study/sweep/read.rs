@@ -14,6 +14,7 @@ use crate::episode::Setup;
 use crate::error::{Error, Result};
 use crate::fault::Fault;
 use crate::render::RendererChoice;
+use crate::storage::io_error;
 
 /// Studies that the program carries with it, as (name, TOML text).
 const BUILTIN: [(&str, &str); 6] = [
@@ -34,8 +35,7 @@ impl Study {
     pub fn open(argument: &str, seeds: Option<RangeInclusive<u64>>) -> Result<Self> {
         let path = Path::new(argument);
         if path.is_file() {
-            let text =
-                std::fs::read_to_string(path).map_err(|source| Error::Io { action: "read", path: path.to_owned(), source })?;
+            let text = std::fs::read_to_string(path).map_err(io_error("read", path))?;
             return Self::from_toml(&text, path, seeds);
         }
         let bare = argument.strip_prefix("worlds/studies/").unwrap_or(argument);

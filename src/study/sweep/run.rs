@@ -8,7 +8,7 @@ use super::rows::{Row, without_result};
 use super::spec::{Chunk, Study};
 use super::value::Value;
 use crate::episode::{Record, Setup, Simulation, Summary};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, go_on};
 use crate::study::pool::{Broken, Pool, Scenes};
 use crate::study::row::Ending;
 use crate::world::World;
@@ -177,9 +177,7 @@ pub fn exhibits(
 ) -> Result<(Vec<Exhibit>, usize)> {
     let (mut shown, mut withheld) = (Vec::new(), 0);
     for row in failures(study, rows, most) {
-        if watch().is_break() {
-            return Err(Error::Interrupted);
-        }
+        go_on(watch())?;
         let (world, _, record, _, again) = replay(study, row.episode)?;
         if again == *row { shown.push(Exhibit { row: again, world, record }) } else { withheld += 1 }
     }

@@ -3,7 +3,6 @@
 use std::ops::RangeInclusive;
 
 use serde::Serialize;
-use sha2::{Digest, Sha256};
 
 use super::design::{self, Design};
 use super::settings::{self, Case};
@@ -11,6 +10,7 @@ use super::value::Value;
 use crate::episode::Setup;
 use crate::error::Result;
 use crate::random::Seed;
+use crate::storage::sha256;
 use crate::world::{Draft, World};
 
 /// Most episodes of one study.
@@ -115,8 +115,7 @@ impl Study {
     /// hashes belong together.
     pub fn sha256(&self) -> String {
         let text = serde_json::to_string(self).unwrap_or_default();
-        let hash = Sha256::digest(format!("wayhome {}\n{text}", crate::VERSION));
-        hash.iter().map(|b| format!("{b:02x}")).collect()
+        sha256(format!("wayhome {}\n{text}", crate::VERSION).as_bytes())
     }
 
     /// The same study on the world that a person named, with its settings and axes applied to another setup, of those axes whose setting

@@ -12,7 +12,7 @@ use serde::Serialize;
 use crate::dataset::conditions::Condition;
 use crate::dataset::pipeline::Job;
 use crate::dataset::plan::{Headings, Places, Plan, Request};
-use crate::error::{Error, Result};
+use crate::error::{Result, go_on};
 use crate::panorama::{Panorama, Projection};
 use crate::panorama_set::{
     LayoutKind, encode_instance, encode_range, encode_rgb, modes, packed_instance, packed_range, packed_rgb,
@@ -105,9 +105,9 @@ pub struct DatasetSpeeds {
 /// measured, every few seconds.
 ///
 /// # Errors
-/// When the world cannot be rendered, or a set cannot be written; [`Error::Interrupted`] when `watch` breaks.
+/// When the world cannot be rendered, or a set cannot be written; [`Error::Interrupted`](crate::Error::Interrupted) when `watch` breaks.
 pub fn measure(world: &World, frames: usize, scratch: &Path, watch: &dyn Fn(&str) -> ControlFlow<()>) -> Result<DatasetSpeeds> {
-    let go_on = |what: &str| if watch(what).is_break() { Err(Error::Interrupted) } else { Ok(()) };
+    let go_on = |what: &str| go_on(watch(what));
     let mut rates = Vec::new();
     for (width, height) in SIZES {
         rates.extend(measure_size(world, (width, height), frames, scratch, &|| go_on(&format!("{width}x{height}")))?);

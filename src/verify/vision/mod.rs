@@ -15,7 +15,7 @@ use std::time::Instant;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use crate::error::{Error, Result};
+use crate::error::{Result, go_on};
 use crate::geometry::{Pose, Twist, direction};
 use crate::observation::HomeSnapshot;
 use crate::panorama::{Panorama, Shot};
@@ -172,10 +172,9 @@ pub fn measure(
                 if factor == Factor::Distance {
                     study.errors_rad[k].1.extend_from_slice(&score.errors_rad);
                 }
-                study.levels.push(level_score(world, factor, level, &score));
-                if study.levels.last().is_some_and(|last| watch(last).is_break()) {
-                    return Err(Error::Interrupted);
-                }
+                let score = level_score(world, factor, level, &score);
+                go_on(watch(&score))?;
+                study.levels.push(score);
             }
         }
     }
