@@ -20,7 +20,7 @@ mod simulation;
 mod summary;
 
 pub use parts::{Parts, PlantMaker};
-pub use record::{Belief, Ending, Outcome, Pictures, Record, Step, Timing};
+pub use record::{Belief, Outcome, Pictures, Record, Step, Timing};
 pub use recorder::{Moment, Recorder};
 pub use setup::{Look, PlantKind, SensorKind, Setup, Start, StopRule};
 pub use simulation::{Phase, Progress, Simulation, Watch};

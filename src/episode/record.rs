@@ -33,37 +33,6 @@ impl Outcome {
     }
 }
 
-/// What ended a run.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Ending {
-    /// The method claimed to be home.
-    Claimed,
-    /// The robot truly was within the arrival radius, where that is what ends a run.
-    Reached,
-    /// The method gave up.
-    GaveUp,
-    /// The time limit.
-    OutOfTime,
-    /// The robot did not move although it was told to.
-    Stuck,
-    /// The method broke.
-    Broke,
-}
-
-impl Ending {
-    /// How a run that ended so comes out, with the robot at rest at home or elsewhere.
-    pub(super) fn outcome(self, is_home: bool) -> Outcome {
-        match self {
-            Self::Reached => Outcome::Home,
-            Self::Claimed if is_home => Outcome::Home,
-            Self::Claimed | Self::GaveUp => Outcome::Lost,
-            Self::OutOfTime => Outcome::Timeout,
-            Self::Stuck => Outcome::Stuck,
-            Self::Broke => Outcome::Failed,
-        }
-    }
-}
-
 /// One control step: the truth, what was sensed of it, and the method's answer.
 #[derive(Debug, Clone, Copy)]
 pub struct Step {

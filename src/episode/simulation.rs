@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use super::parts::{Parts, PlantMaker, Shared};
-use super::record::{Ending, Outcome, Pictures, Record, Step, Timing};
+use super::record::{Outcome, Pictures, Record, Step, Timing};
 use super::recorder::{Moment, Recorder};
 use super::setup::{Setup, StopRule};
 use super::summary::Summary;
@@ -356,7 +356,7 @@ impl<'a> Simulation<'a> {
     /// The loop: observe, decide, move, until the method says that it is over, the time limit, or a robot that is stuck. Then the
     /// robot comes to rest, and the distance from there to home decides whether a claim to be home is right.
     fn close_loop(&mut self, method: &mut dyn Method, watch: &mut Watch<'_>) -> Result<Record> {
-        let ending = loop {
+        let status = loop {
             let deciding = Instant::now();
             let decision = method.step(&self.observation()?);
             self.running_mut()?.timing.estimation_s += deciding.elapsed().as_secs_f64();
@@ -364,39 +364,33 @@ impl<'a> Simulation<'a> {
             let time_s = self.running()?.time_s(self.task.control_period_s);
             let progress = Progress { time_s, distance_m: self.distance_m(), estimate: decision.estimate };
             go_on(watch(&progress))?;
-            match (self.phase(), decision.status) {
-                (Phase::Reached, _) => break Ending::Reached,
-                (_, Status::Arrived) => break Ending::Claimed,
-                (_, Status::Lost) => break Ending::GaveUp,
-                (_, Status::Failed) => break Ending::Broke,
-                (Phase::OutOfTime, Status::Running) => break Ending::OutOfTime,
-                (Phase::Stuck, Status::Running) => break Ending::Stuck,
-                (Phase::Running, Status::Running) => {}
+            if self.phase() != Phase::Running || decision.status != Status::Running {
+                break decision.status;
             }
             // A method that commands what no number describes has lost its way; the plant must not inherit it.
             if !(decision.command.v.is_finite() && decision.command.omega.is_finite()) {
-                break Ending::GaveUp;
+                break Status::Lost;
             }
             self.advance(decision.command, None)?;
         };
-        self.finish(ending, method.failure().map(str::to_owned))
+        self.finish(status, method.failure().map(str::to_owned))
     }
 
-    /// Ends the run: stops the robot, waits until it rests, tells the recorder, and hands the record over. A run that is stepped by
-    /// hand needs no end but for its record.
+    /// Ends the run, of which its method thinks `status`: stops the robot, waits until it rests, tells the recorder, and hands the record
+    /// over. A run that is stepped by hand needs no end but for its record.
     ///
     /// # Errors
     /// Before the first reset, and when the recorder fails.
-    pub fn finish(&mut self, ending: Ending, failure: Option<String>) -> Result<Record> {
+    pub fn finish(&mut self, status: Status, failure: Option<String>) -> Result<Record> {
         self.running()?;
         let end = self.sensor.panorama().cloned();
         self.come_to_rest()?;
         let Some(episode) = self.episode.take() else { return Err(not_reset()) };
-        let Episode { seed, steps, collisions, start_picture, timing, began, .. } = episode;
+        let Episode { seed, phase, steps, collisions, start_picture, timing, began, .. } = episode;
         let ended = steps.iter().rev().find(|step| step.seen.is_some()).map_or(0.0, |step| step.time_s);
         let mut record = Record {
             outcome: Outcome::Lost,
-            claimed_home: ending == Ending::Claimed,
+            claimed_home: status == Status::Arrived && phase != Phase::Reached,
             failure,
             time_s: ended,
             collisions,
@@ -408,7 +402,14 @@ impl<'a> Simulation<'a> {
             timing,
         };
         let is_home = record.final_distance_m() <= self.task.arrival_radius_m;
-        record.outcome = ending.outcome(is_home);
+        record.outcome = match (phase, status) {
+            (Phase::Reached, _) => Outcome::Home,
+            (_, Status::Arrived) if is_home => Outcome::Home,
+            (_, Status::Arrived | Status::Lost) | (Phase::Running, Status::Running) => Outcome::Lost,
+            (_, Status::Failed) => Outcome::Failed,
+            (Phase::OutOfTime, Status::Running) => Outcome::Timeout,
+            (Phase::Stuck, Status::Running) => Outcome::Stuck,
+        };
         let sensing = self.sensor.timing();
         let wall_s = began.elapsed().as_secs_f64();
         record.timing = Timing {
