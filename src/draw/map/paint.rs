@@ -23,6 +23,7 @@ pub(crate) const STARTS: &str = "#4a7a2c";
 /// How a kind of body is filled and outlined.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct BodyPaint {
+    pub kind: &'static str,
     pub fill: &'static str,
     pub line: &'static str,
     /// Drawn see-through with a dashed outline: hangs above the robot.
@@ -32,21 +33,12 @@ pub(crate) struct BodyPaint {
 impl BodyPaint {
     /// That of the body of this number in `world`.
     pub(crate) fn of(world: &World, k: usize, dashed: bool) -> Self {
-        match () {
-            () if k < world.landmark_count => Self::landmark(dashed),
-            () if world.bodies[k].motion.is_some() => Self::mover(dashed),
-            () => Self::obstacle(dashed),
-        }
-    }
-
-    pub(crate) fn landmark(dashed: bool) -> Self {
-        Self { fill: "#8db4d6", line: "#2f5d86", dashed }
-    }
-    pub(crate) fn obstacle(dashed: bool) -> Self {
-        Self { fill: "#cfc6b8", line: "#7a6c58", dashed }
-    }
-    pub(crate) fn mover(dashed: bool) -> Self {
-        Self { fill: "#f2b36b", line: "#a65c0f", dashed }
+        let (kind, fill, line) = match () {
+            () if k < world.landmark_count => ("landmark", "#8db4d6", "#2f5d86"),
+            () if world.bodies[k].motion.is_some() => ("moving body", "#f2b36b", "#a65c0f"),
+            () => ("obstacle", "#cfc6b8", "#7a6c58"),
+        };
+        Self { kind, fill, line, dashed }
     }
 }
 

@@ -30,8 +30,8 @@ impl MapDrawing {
         }
         let hangs = |body: &Body| body.bottom_m >= world.spec.robot.height_m;
         for pass in [false, true] {
-            for (k, body) in world.bodies.iter().enumerate().filter(|(_, body)| hangs(body) == pass) {
-                self.draw_body(body, k < world.landmark_count, pass);
+            for k in (0..world.bodies.len()).filter(|&k| hangs(&world.bodies[k]) == pass) {
+                self.draw_body(world, k, pass);
             }
         }
         self.draw_home(world);
@@ -121,7 +121,8 @@ impl MapDrawing {
         self.legend.add(Swatch::Way, "way or region of a moving body");
     }
 
-    fn draw_body(&mut self, body: &Body, is_landmark: bool, hangs: bool) {
+    fn draw_body(&mut self, world: &World, k: usize, hangs: bool) {
+        let body = &world.bodies[k];
         let at = self.frame.at(body.pose.position());
         let radius = match &body.footprint {
             Footprint::Disc(radius_m) => Some(radius_m * self.frame.px_per_m),
@@ -129,13 +130,7 @@ impl MapDrawing {
         };
         // Dashes around a dot would be all that is left of it.
         let dashed = hangs && radius.is_none_or(|radius| radius > LEAST_RADIUS_PX);
-        let (paint, kind) = if is_landmark {
-            (BodyPaint::landmark(dashed), "landmark")
-        } else if body.motion.is_some() {
-            (BodyPaint::mover(dashed), "moving body")
-        } else {
-            (BodyPaint::obstacle(dashed), "obstacle")
-        };
+        let paint = BodyPaint::of(world, k, dashed);
         let shape: Box<dyn svg::Node> = match radius {
             Some(radius) => Box::new(paint_body(circle(at, radius.max(LEAST_RADIUS_PX)), paint)),
             None => Box::new(paint_body(polygon(&self.shape_of(body)), paint)),
@@ -143,7 +138,7 @@ impl MapDrawing {
         self.add(shape);
         let (low, high) = bounds(&self.shape_of(body));
         self.labels.avoid([low.x, low.y, high.x, high.y]);
-        let label = if hangs { format!("{kind} above the robot") } else { kind.to_owned() };
+        let label = if hangs { format!("{} above the robot", paint.kind) } else { paint.kind.to_owned() };
         self.legend.add(Swatch::Body(paint), &label);
     }
 

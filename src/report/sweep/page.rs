@@ -215,7 +215,7 @@ impl Page<'_> {
         let rows = rows.into_iter().map(|(name, value)| [name.to_owned(), value]);
         *text += "<h2>Settings and versions</h2>\n";
         *text += &table(" class=\"words\"", &[], rows);
-        let _ = write!(text, "<div class=\"scroll\"><pre>{}</pre></div>\n", escaped(&study.text));
+        let _ = writeln!(text, "<div class=\"scroll\"><pre>{}</pre></div>", escaped(&study.text));
     }
 }
 
