@@ -1,6 +1,7 @@
 //! Reading a world file and resolving it into a [`World`].
 
 use std::path::{Path, PathBuf};
+use std::sync::LazyLock;
 
 use serde::Deserialize;
 use sha2::{Digest, Sha256};
@@ -44,6 +45,9 @@ const BUILTIN_IMAGES: [(&str, &[u8]); 2] = [
     ("gallery/poster.png", include_bytes!("../../worlds/gallery/poster.png")),
 ];
 
+/// The schema of world files, which takes as long to make as a small file takes to be checked.
+static SCHEMA: LazyLock<serde_json::Value> = LazyLock::new(|| schemars::schema_for!(WorldSpec).to_value());
+
 /// Thickness of a window's pane, m.
 const PANE_M: f64 = 0.01;
 
@@ -84,7 +88,7 @@ impl World {
     /// JSON Schema of the world file (draft 2020-12).
     #[must_use]
     pub fn json_schema() -> serde_json::Value {
-        schemars::schema_for!(WorldSpec).to_value()
+        SCHEMA.clone()
     }
 
     /// Checks a world given as TOML text. `source` names it in messages; images are looked for in its folder.
@@ -117,7 +121,7 @@ impl World {
 
     pub(super) fn from_tree(mut tree: Node, path: &Path, text: &str) -> Result<Self> {
         let as_read = tree.clone(); // the check below removes unknown fields, whose lines are still wanted
-        let Findings { unknown, not_finite, unreadable } = structure::check(&mut tree, &Self::json_schema());
+        let Findings { unknown, not_finite, unreadable } = structure::check(&mut tree, &SCHEMA);
         let mut faults = unknown;
         if unreadable.is_empty() {
             if let Some(preset) = tree.get("robot").and_then(|robot| robot.get("preset")).cloned() {
