@@ -13,7 +13,7 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde::Serialize;
 use wayhome::Error;
 use wayhome::command_line::command_line;
-use wayhome::storage::OutputFolder;
+use wayhome::storage::{OutputFolder, write_atomically};
 use wayhome::study::pool::Pool;
 
 /// Exit code of a process that is interrupted a second time, and of one that ends in good order after the first.
@@ -92,6 +92,11 @@ impl Context {
     /// The workers of a study, which Ctrl-C stops.
     pub fn pool(&self) -> Pool<'_> {
         Pool { threads: rayon::current_num_threads(), stopped: &self.stopped }
+    }
+
+    /// Whether results are printed as JSON.
+    pub fn wants_json(&self) -> bool {
+        self.json
     }
 
     /// Prints a result: as one JSON object where the user asked for it, else as text.
@@ -216,6 +221,14 @@ pub fn folder_or(given: Option<&Path>, parts: &[&str]) -> PathBuf {
     let harmless = |c: char| if c.is_alphanumeric() || "-_.".contains(c) { c } else { '-' };
     let usual = || PathBuf::from("results/runs").join(parts.join("-").chars().map(harmless).collect::<String>());
     given.map_or_else(usual, Path::to_owned)
+}
+
+/// Writes a file that begins with `head`, over one that begins so too but over no other.
+pub fn write_own(path: &Path, text: &str, head: &str) -> Result<()> {
+    if path.exists() && !std::fs::read(path).is_ok_and(|held| held.starts_with(head.as_bytes())) {
+        return Err(Error::FileTaken { path: path.to_owned() }.into());
+    }
+    Ok(write_atomically(path, text.as_bytes())?)
 }
 
 /// Opens the folder for the results of `verb`: the one given, or else that of [`folder_or`].

@@ -1,7 +1,7 @@
 //! `wayhome world generate`: rooms drawn from a seed, and sheets of them.
 
 use std::fmt::Write;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use anyhow::Result;
 use rayon::prelude::*;
@@ -14,7 +14,7 @@ use wayhome::storage::{OutputFolder, write_atomically};
 use wayhome::world::World;
 use wayhome::world::generate::{Generated, HEAD, Kind, Knob, Knobs, OUTLINE, Outline, generate, usual_outlines};
 
-use super::context::{Context, Verdict, folder_or, print};
+use super::context::{Context, Verdict, folder_or, print, write_own};
 use super::values::choice;
 
 /// Names of the files in a folder of generated worlds.
@@ -105,7 +105,7 @@ pub fn run(args: &GenerateArgs, context: &Context) -> Result<Verdict> {
                 folder.write(&format!("{}.toml", world.spec.name), world.toml.as_bytes())?;
             }
             if let Some(path) = file {
-                write_own(path, &world.toml)?;
+                write_own(path, &world.toml, HEAD)?;
             }
             if let Some(sheet) = &mut sheet {
                 sheet.add(&world)?;
@@ -140,14 +140,6 @@ pub fn run(args: &GenerateArgs, context: &Context) -> Result<Verdict> {
         format!("{} {of} of kind {kind}, seeds {}..{last}: {places}\n", args.count, args.seed)
     })?;
     Ok(Verdict::Done)
-}
-
-/// Writes a world file, over one that was generated before but over no other.
-fn write_own(path: &Path, toml: &str) -> Result<()> {
-    if path.exists() && !std::fs::read(path).is_ok_and(|held| held.starts_with(HEAD.as_bytes())) {
-        return Err(Error::FileTaken { path: path.to_owned() }.into());
-    }
-    Ok(write_atomically(path, toml.as_bytes())?)
 }
 
 /// Renders worlds for a sheet.

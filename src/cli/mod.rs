@@ -14,6 +14,7 @@ mod dataset;
 mod drive;
 mod generate;
 mod home;
+mod map;
 mod observability;
 mod render;
 mod reproduce;

@@ -27,6 +27,10 @@ pub enum WorldCommand {
     },
     /// Make worlds from a seed: rooms without end
     Generate(Box<super::generate::GenerateArgs>),
+    /// Make a world of a ROS or Nav2 map, or of a floor plan
+    Import(Box<super::map::ImportArgs>),
+    /// Draw a world as a map for ROS and Nav2: map.yaml and map.pgm
+    Export(super::map::ExportArgs),
     /// Draw a world from above as SVG
     Plot {
         /// World file, or the name of a built-in world
@@ -58,6 +62,8 @@ pub fn run(args: &WorldArgs, context: &Context) -> Result<Verdict> {
     match &args.command {
         WorldCommand::Check { world } => check(&World::open(world)?, context)?,
         WorldCommand::Generate(args) => return super::generate::run(args, context),
+        WorldCommand::Import(args) => return super::map::import(args, context),
+        WorldCommand::Export(args) => return super::map::export(args, context),
         WorldCommand::Plot { world, out } => {
             let drawing = map::world_svg(&World::open(world)?);
             match out {

@@ -19,7 +19,7 @@ pub struct Boundary {
 }
 
 impl Boundary {
-    pub(super) fn new(corners: &[Vector2<f64>]) -> Self {
+    pub(in crate::world) fn new(corners: &[Vector2<f64>]) -> Self {
         let boxes = || polygon::edges(corners).map(|(a, b)| bounds_of(&[a, b], 0.0)).collect::<Vec<_>>();
         Self { corners: corners.to_vec(), grid: (corners.len() > FEW).then(|| Grid::new(&boxes())) }
     }

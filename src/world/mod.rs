@@ -16,6 +16,7 @@ pub mod generate;
 pub(crate) mod grid;
 mod light;
 mod load;
+pub mod map;
 mod picture;
 pub mod polygon;
 mod repeats;

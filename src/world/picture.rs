@@ -12,7 +12,7 @@ use std::sync::Arc;
 use image::{ImageReader, Limits};
 
 /// Largest file, bytes.
-const MOST_BYTES: u64 = 64 << 20;
+pub(super) const MOST_BYTES: u64 = 64 << 20;
 /// Longest side, pixels.
 pub(super) const LONGEST_PX: u32 = 16_384;
 /// Most pixels of an image.
@@ -110,7 +110,8 @@ fn read_below(folder: &Path, path: &str) -> Result<Vec<u8>, Refusal> {
     std::fs::read(&file).map_err(unreadable)
 }
 
-fn decode(bytes: &[u8]) -> Result<Picture, Refusal> {
+/// The image in a file's bytes.
+pub(super) fn decode(bytes: &[u8]) -> Result<Picture, Refusal> {
     let damaged = |e: &dyn std::fmt::Display| (format!("which cannot be decoded ({e})"), ALLOWED.to_owned());
     let reader = || -> Result<_, Refusal> {
         let mut reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|e| damaged(&e))?;

@@ -143,7 +143,7 @@ pub fn segments_cross(a: Vector2<f64>, b: Vector2<f64>, c: Vector2<f64>, d: Vect
 }
 
 /// Whether two closed segments have a point in common.
-fn segments_meet(a: Vector2<f64>, b: Vector2<f64>, c: Vector2<f64>, d: Vector2<f64>) -> bool {
+pub(crate) fn segments_meet(a: Vector2<f64>, b: Vector2<f64>, c: Vector2<f64>, d: Vector2<f64>) -> bool {
     let in_box = |p: Vector2<f64>, q: Vector2<f64>, r: Vector2<f64>| {
         r.x >= p.x.min(q.x) && r.x <= p.x.max(q.x) && r.y >= p.y.min(q.y) && r.y <= p.y.max(q.y)
     };

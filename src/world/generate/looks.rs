@@ -8,7 +8,7 @@ use crate::world::spec::{TextureFamily, TextureSpec};
 
 /// Colours that things of a kind have.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Tone {
+pub(in crate::world) enum Tone {
     /// White and off-white paint, light greys.
     Paint,
     /// Paint with a hue.
@@ -56,7 +56,7 @@ impl Tone {
     }
 
     /// A colour of this tone.
-    pub(super) fn colour(self, dice: &mut Dice) -> [u8; 3] {
+    pub(in crate::world) fn colour(self, dice: &mut Dice) -> [u8; 3] {
         let shade = dice.between(0.92, 1.06);
         let tint = [(); 3].map(|()| dice.between(-6.0, 6.0));
         let base = *dice.pick(self.colours());
@@ -65,7 +65,7 @@ impl Tone {
 }
 
 /// Draws textures.
-pub(super) struct Looks {
+pub(in crate::world) struct Looks {
     dice: Dice,
     /// Share of things that bear a pattern, and its strength.
     richness: f64,
@@ -76,7 +76,7 @@ pub(super) struct Looks {
 }
 
 impl Looks {
-    pub(super) fn new(seed: Seed, richness: f64, repetition: f64) -> Self {
+    pub(in crate::world) fn new(seed: Seed, richness: f64, repetition: f64) -> Self {
         Self { dice: Dice::new(seed, "looks"), richness, repetition, alike: BTreeMap::new() }
     }
 
@@ -87,7 +87,12 @@ impl Looks {
 
     /// Textures of a room's walls, by their lengths: one paint for all of them, and one of the patterns of `rich` on as many as the
     /// room is rich. A pattern covers a wall once, unless it is drawn to repeat.
-    pub(super) fn walls(&mut self, lengths_m: &[f64], paint: Tone, rich: &[(TextureFamily, Tone)]) -> Vec<TextureSpec> {
+    pub(in crate::world) fn walls(
+        &mut self,
+        lengths_m: &[f64],
+        paint: Tone,
+        rich: &[(TextureFamily, Tone)],
+    ) -> Vec<TextureSpec> {
         let colour = paint.colour(&mut self.dice);
         let alike = self.dice.texture_seed();
         let plaster = if self.dice.chance(0.2 + self.richness) { TextureFamily::Noise } else { TextureFamily::Plain };
@@ -120,7 +125,7 @@ impl Looks {
     }
 
     /// Texture of a floor or ceiling of this length, of one of these sorts, with at most this contrast.
-    pub(super) fn ground(&mut self, length_m: f64, sorts: &[(TextureFamily, Tone)], most: f64) -> TextureSpec {
+    pub(in crate::world) fn ground(&mut self, length_m: f64, sorts: &[(TextureFamily, Tone)], most: f64) -> TextureSpec {
         let &(family, tone) = self.dice.pick(sorts);
         let (colour, contrast) = (tone.colour(&mut self.dice), self.contrast(most));
         // Floors are laid in a pattern that nobody draws anew for 20 m.
@@ -129,7 +134,13 @@ impl Looks {
     }
 
     /// Texture of a thing: `period_m` is how far its pattern reaches.
-    pub(super) fn thing(&mut self, name: &'static str, family: TextureFamily, tone: Tone, period_m: f64) -> TextureSpec {
+    pub(in crate::world) fn thing(
+        &mut self,
+        name: &'static str,
+        family: TextureFamily,
+        tone: Tone,
+        period_m: f64,
+    ) -> TextureSpec {
         if self.dice.chance(self.repetition) {
             if let Some(known) = self.alike.get(name) {
                 return known.clone();

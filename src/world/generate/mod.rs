@@ -20,7 +20,7 @@
 //! it see, on a grid of all places that the robot can drive to from there (`reach`). A drawing in which there is none is thrown
 //! away, and the next one of the same seed is taken.
 
-mod dice;
+pub(in crate::world) mod dice;
 mod flat;
 mod furnished;
 mod furniture;
@@ -28,11 +28,11 @@ mod home;
 mod kind;
 mod knobs;
 mod large;
-mod looks;
+pub(in crate::world) mod looks;
 mod outline;
 mod plan;
 mod reach;
-mod room;
+pub(in crate::world) mod room;
 
 pub use kind::Kind;
 pub use knobs::{Drawn, Knob, Knobs, OUTLINE, Ranges, usual_outlines};

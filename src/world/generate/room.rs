@@ -12,7 +12,7 @@ use crate::world::spec::TextureFamily::{self, Brick, Noise, Planks, Posters, She
 use crate::world::spec::{LampSpec, LightSpec, TextureSpec};
 
 /// Patterns that a rich wall bears.
-pub(super) const RICH: &[(TextureFamily, Tone)] = &[
+pub(in crate::world) const RICH: &[(TextureFamily, Tone)] = &[
     (Posters, Tone::Pastel),
     (Posters, Tone::Paper),
     (Brick, Tone::Clay),
