@@ -2,6 +2,7 @@
 
 use std::f64::consts::PI;
 use std::fmt::Write;
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -9,10 +10,11 @@ use anyhow::{Result, bail};
 use serde::Serialize;
 use wayhome::dataset::check::{Inspection, check};
 use wayhome::dataset::conditions::{CHANGES, Condition};
-use wayhome::dataset::pipeline::Job;
+use wayhome::dataset::pipeline::{Job, Outcome, Progress};
 use wayhome::dataset::plan::{Headings, Places, Plan, Request};
+use wayhome::dataset::series::{Series, SeriesJob};
 use wayhome::panorama_set::LayoutKind;
-use wayhome::render::{self, RendererChoice};
+use wayhome::render::{self, Renderer, RendererChoice};
 use wayhome::report::dataset as report;
 
 use super::changes::ChangeArgs;
@@ -35,12 +37,18 @@ pub struct DatasetArgs {
     #[command(subcommand)]
     pub command: Option<DatasetCommand>,
     /// World file, or the name of a built-in world
-    #[arg(required = true)]
+    #[arg(required_unless_present = "worlds")]
     pub world: Option<String>,
+    /// Many worlds instead: `office:1..500,flat:7,FOLDER/,lab`, as many random places in each. Layouts folder, image-folder, webdataset
+    #[arg(long, value_name = "SPEC", requires = "count", conflicts_with_all = ["world", "changes", "home", "places"])]
+    pub worlds: Option<String>,
+    /// Where: so many random places in all of --worlds together
+    #[arg(long, value_name = "N", requires = "worlds")]
+    pub count: Option<usize>,
     #[command(flatten)]
     pub changes: ChangeArgs,
     /// Where: an even grid with so many places along x and y. One of --grid, --route, --random and --trajectory is needed
-    #[arg(long, value_name = "NXxNY", value_parser = grid, requires = "spacing_m", required_unless_present_any = ["route", "random", "trajectory"])]
+    #[arg(long, value_name = "NXxNY", value_parser = grid, requires = "spacing_m", required_unless_present_any = ["route", "random", "trajectory", "worlds"])]
     pub grid: Option<(usize, usize)>,
     /// Distance between places of the grid, m
     #[arg(long, value_name = "S", requires = "grid", allow_negative_numbers = true, value_parser = positive)]
@@ -138,6 +146,8 @@ fn licence(text: &str) -> Result<String, String> {
 /// What `--json` prints of a set.
 #[derive(Serialize)]
 struct Made {
+    #[serde(skip_serializing_if = "Option::is_none")]
+    worlds: Option<usize>,
     frames: usize,
     rendered: usize,
     found: usize,
@@ -164,17 +174,54 @@ pub fn run(args: &DatasetArgs, context: &Context) -> Result<Verdict> {
     }
 }
 
+/// A set of one world or of many.
+enum Work {
+    One(Box<Plan>),
+    Many(Box<Series>),
+}
+
+impl Work {
+    fn new(args: &DatasetArgs, context: &Context) -> Result<(Self, String)> {
+        let request = request(args, context);
+        if let Some(given) = &args.worlds {
+            return Ok((Self::Many(Box::new(Series::new(given, request)?)), "worlds".to_owned()));
+        }
+        let world = args.changes.open(args.world.as_deref().unwrap_or_default())?;
+        Ok((Self::One(Box::new(Plan::new(&world, request)?)), world.spec.name))
+    }
+
+    fn frames(&self) -> usize {
+        match self {
+            Self::One(plan) => plan.frames(),
+            Self::Many(series) => series.frames(),
+        }
+    }
+
+    /// Makes what is missing of a share of it.
+    fn run(
+        &self,
+        out: &Path,
+        shard: (usize, usize),
+        renderer: &mut dyn Renderer,
+        watch: &mut (dyn FnMut(Progress) -> ControlFlow<()> + Send),
+    ) -> wayhome::Result<Outcome> {
+        let extras = &report::card;
+        match self {
+            Self::One(plan) => Job { plan, out, shard, extras }.run(renderer, watch),
+            Self::Many(series) => SeriesJob { series, out, shard, extras }.run(renderer, watch),
+        }
+    }
+}
+
 fn make(args: &DatasetArgs, context: &Context) -> Result<Verdict> {
-    let world = args.changes.open(args.world.as_deref().unwrap_or_default())?;
-    let plan = Plan::new(&world, request(args, context))?;
-    let out = folder_or(args.out.as_deref(), &["dataset", &world.spec.name, &args.seed.to_string()]);
+    let (work, name) = Work::new(args, context)?;
+    let out = folder_or(args.out.as_deref(), &["dataset", &name, &args.seed.to_string()]);
     let mut renderer = render::create(args.renderer)?;
-    let bar = context.work(plan.frames() as u64)?;
+    let bar = context.work(work.frames() as u64)?;
     let mut begun = None;
     let mut told = Instant::now();
     let shard = args.shard.map_or((1, 1), |[i, n]| (i as usize, n as usize));
-    let job = Job { plan: &plan, out: &out, shard, extras: &report::card };
-    let outcome = job.run(renderer.as_mut(), &mut |progress| {
+    let outcome = work.run(&out, shard, renderer.as_mut(), &mut |progress| {
         let (start, found) = *begun.get_or_insert_with(|| {
             // What is there already says nothing about the rate.
             bar.set_length(progress.all as u64);
@@ -193,12 +240,17 @@ fn make(args: &DatasetArgs, context: &Context) -> Result<Verdict> {
         bar.flow()
     })?;
     drop(bar);
+    let (worlds, left_out, parts) = match &work {
+        Work::One(plan) => (None, plan.left_out(), plan.parts.len()),
+        Work::Many(series) => (Some(series.worlds()), 0, series.parts()),
+    };
     let made = Made {
-        frames: plan.frames(),
+        worlds,
+        frames: work.frames(),
         rendered: outcome.rendered,
         found: outcome.found,
-        left_out: plan.left_out(),
-        parts: plan.parts.len(),
+        left_out,
+        parts,
         complete: outcome.complete,
         layout: args.layout,
         renderer: renderer.info().clone(),
@@ -208,7 +260,11 @@ fn make(args: &DatasetArgs, context: &Context) -> Result<Verdict> {
 }
 
 fn text(o: &Made, out: &Path) -> String {
-    let mut text = format!("{} of {} panoramas rendered on {} ({})", o.rendered, o.frames, o.renderer.kind, o.renderer.adapter);
+    let mut text = format!("{} of {} panoramas", o.rendered, o.frames);
+    if let Some(worlds) = o.worlds {
+        let _ = write!(text, " of {worlds} worlds");
+    }
+    let _ = write!(text, " rendered on {} ({})", o.renderer.kind, o.renderer.adapter);
     if o.found > 0 {
         let _ = write!(text, ", {} were there", o.found);
     }
@@ -230,7 +286,7 @@ fn request(args: &DatasetArgs, context: &Context) -> Request {
         },
         (_, Some(path), _) => Places::Route(path.clone()),
         (_, _, Some(path)) => Places::Trajectory(path.clone()),
-        _ => Places::Random(args.random.unwrap_or_default()),
+        _ => Places::Random(args.count.or(args.random).unwrap_or_default()),
     };
     let conditions = if args.conditions.is_empty() { vec![Condition::original()] } else { args.conditions.clone() };
     Request {

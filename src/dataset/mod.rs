@@ -9,6 +9,8 @@
 //! The bytes of a set follow from its command alone: not from the number of threads, nor from how often the work was
 //! interrupted, nor from how it was split over machines.
 //!
+//! A [`Series`](series::Series) is a set over many worlds, each of which is made when its frames are and then dropped.
+//!
 //! Knows of: worlds, the renderer and the layouts of sets. Must not know of episodes.
 
 pub mod check;
@@ -17,4 +19,5 @@ pub mod film;
 pub mod parts;
 pub mod pipeline;
 pub mod plan;
+pub mod series;
 pub mod truth;

@@ -33,7 +33,7 @@ const QUEUE_BYTES: usize = 64 << 20;
 /// Bytes of a pixel in the files of a frame, roughly.
 const FILE_BYTES: usize = 2;
 /// Parts whose views are handed to the renderer at once.
-const BATCH: usize = 32;
+pub(super) const BATCH: usize = 32;
 /// What a set may need beyond the estimate from one panorama, as pictures differ.
 const RESERVE: f64 = 1.3;
 /// Bytes of truth a frame, roughly.
@@ -75,10 +75,17 @@ pub struct Job<'a> {
 }
 
 /// A condition made ready.
-struct Set<'a> {
+pub(super) struct Set<'a> {
     scene: Scene,
     camera: Camera,
-    witness: Witness<'a>,
+    pub(super) witness: Witness<'a>,
+}
+
+/// The files of a home panorama, whose columns run anti-clockwise in every layout.
+pub(super) fn home_pictures(home: &Panorama, stem: &str) -> Result<Vec<(String, Vec<u8>)>> {
+    let [rgb, range, instance] = ["rgb", "range", "instance"].map(|channel| format!("{stem}.{channel}.png"));
+    let pictures = [encode_rgb(home, &rgb)?, encode_range(home, &range)?, encode_instance(home, &instance)?];
+    Ok([rgb, range, instance].into_iter().zip(pictures).collect())
 }
 
 impl Job<'_> {
@@ -113,11 +120,7 @@ impl Job<'_> {
         for (k, stage) in plan.stages.iter().enumerate() {
             let set = first.take().map_or_else(|| self.prepare(stage, &base, renderer), Ok)?;
             let home = set.witness.home();
-            let name = |channel: &str| format!("home/{}.{channel}.png", stage.staged.condition.name());
-            let (rgb, range, instance) = (name("rgb"), name("range"), name("instance"));
-            // Columns run anti-clockwise here in every layout.
-            let pictures = [encode_rgb(home, &rgb)?, encode_range(home, &range)?, encode_instance(home, &instance)?];
-            let mut beside: Vec<(String, Vec<u8>)> = [rgb, range, instance].into_iter().zip(pictures).collect();
+            let mut beside = home_pictures(home, &format!("home/{}", stage.staged.condition.name()))?;
             if k == 0 {
                 beside.extend((self.extras)(plan.request().layout.layout(), &folder.document, home)?);
             }
@@ -126,7 +129,7 @@ impl Job<'_> {
             }
             let parts: Vec<Part> = pending.iter().filter(|p| p.stage == k).copied().collect();
             for parts in parts.chunks(BATCH) {
-                self.make(&folder, &set, parts, renderer, &mut progress, watch)?;
+                self.make(&folder, &set, parts, &[], renderer, &mut progress, watch)?;
             }
         }
         let complete = plan.parts.iter().all(|part| folder.is_done(*part));
@@ -141,7 +144,7 @@ impl Job<'_> {
     }
 
     /// Packs the scene of a condition and takes its home panorama.
-    fn prepare<'s>(&self, stage: &'s Stage, base: &Scene, renderer: &mut dyn Renderer) -> Result<Set<'s>> {
+    pub(super) fn prepare<'s>(&self, stage: &'s Stage, base: &Scene, renderer: &mut dyn Renderer) -> Result<Set<'s>> {
         let staged = &stage.staged;
         let scene = if staged.world == self.plan.world { base.clone() } else { Scene::new(&staged.world)? };
         let scene = scene.under(staged.light, staged.optics.exposure);
@@ -158,7 +161,7 @@ impl Job<'_> {
     }
 
     /// Refuses a set for which there is no room.
-    fn check_room(&self, home: &Panorama, frames: usize) -> Result<()> {
+    pub(super) fn check_room(&self, home: &Panorama, frames: usize) -> Result<()> {
         let frame_bytes =
             encode_rgb(home, "home")?.len() + encode_range(home, "home")?.len() + encode_instance(home, "home")?.len();
         let needed = (RESERVE * (frame_bytes + TRUTH_BYTES) as f64 * frames as f64) as u64;
@@ -169,12 +172,14 @@ impl Job<'_> {
         check_room(there, needed, &format!("{}, for {whose}", self.out.display()))
     }
 
-    /// Makes some parts of one condition.
-    fn make(
+    /// Makes some parts of one condition. Files that were written `beside` go into the record of the first of them.
+    #[allow(clippy::too_many_arguments, reason = "what a run has at hand, each of its own kind")]
+    pub(super) fn make(
         &self,
         folder: &SetFolder,
         set: &Set<'_>,
         parts: &[Part],
+        beside: &[FileRecord],
         renderer: &mut dyn Renderer,
         progress: &mut Progress,
         watch: &mut (dyn FnMut(Progress) -> ControlFlow<()> + Send),
@@ -187,7 +192,7 @@ impl Job<'_> {
         let queue = (QUEUE_BYTES / (FILE_BYTES * plan.projection.pixels())).clamp(2, QUEUE);
         let (sender, receiver) = sync_channel::<Encoded>(queue);
         std::thread::scope(|scope| {
-            let writing = scope.spawn(move || self.write_parts(folder, parts, &receiver));
+            let writing = scope.spawn(move || self.write_parts(folder, parts, beside, &receiver));
             let rendered = renderer.render_batch(&set.scene, &views, &mut |first, panoramas| {
                 go_on(watch(*progress))?;
                 let numbered = panoramas.par_iter_mut().zip(&frames[first..]).with_max_len(1);
@@ -243,10 +248,10 @@ impl Job<'_> {
     }
 
     /// Writes parts as their frames come in. Ends without a fault where frames stop coming; a part that was begun is then given up.
-    fn write_parts(&self, folder: &SetFolder, parts: &[Part], frames: &Receiver<Encoded>) -> Result<()> {
-        for part in parts {
+    fn write_parts(&self, folder: &SetFolder, parts: &[Part], beside: &[FileRecord], frames: &Receiver<Encoded>) -> Result<()> {
+        for (k, part) in parts.iter().enumerate() {
             let condition = self.plan.stages[part.stage].staged.condition.name();
-            let mut record = Record::default();
+            let mut record = Record { files: if k == 0 { beside.to_vec() } else { Vec::new() } };
             let mut held = Vec::with_capacity(part.count);
             let mut archive = None;
             if let Some(name) = self.plan.request().layout.layout().archive(&condition, part.number) {

@@ -10,7 +10,9 @@ use crate::dataset::film;
 use crate::error::{Error, Result};
 use crate::geometry::{Pose, Vector2, angle_of, wrap};
 use crate::panorama::Projection;
-use crate::panorama_set::{ConditionDocument, Document, Frame, GridDocument, Instance, LayoutKind, MOST_PLACES, Place};
+use crate::panorama_set::{
+    ConditionDocument, Document, Frame, GridDocument, Instance, LayoutKind, MOST_PLACES, Place, WorldDocument, WorldRef,
+};
 use crate::random::{Seed, Stream};
 use crate::render::RendererInfo;
 use crate::storage::sha256;
@@ -112,7 +114,20 @@ pub struct Part {
     pub count: usize,
 }
 
-/// All of a set before any of it is rendered.
+/// Where a world's frames are among those of a set of several worlds.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Numbering {
+    /// The world, in a set of several.
+    pub world: Option<WorldRef>,
+    /// Number of its first spot.
+    pub first_spot: usize,
+    /// Spots of the whole set.
+    pub all_spots: usize,
+    /// Number of its first part.
+    pub first_part: usize,
+}
+
+/// All of a set before any of it is rendered: of a set of several worlds all of one world.
 #[derive(Debug, Clone)]
 pub struct Plan {
     /// The world as its file has it.
@@ -126,6 +141,7 @@ pub struct Plan {
     request: Request,
     spots: Vec<Spot>,
     grid: Option<GridDocument>,
+    numbering: Numbering,
 }
 
 impl Plan {
@@ -134,7 +150,16 @@ impl Plan {
     /// # Errors
     /// When the places do not fit the room, a table cannot be read, the layout cannot hold them, or nothing is left to take.
     pub fn new(world: &World, request: Request) -> Result<Self> {
-        let (spots, grid) = spots(world, &request)?;
+        Self::numbered(world, request, None)
+    }
+
+    /// The same for a world of a set of several. Its random places are free under all conditions, so that their number is known.
+    pub(super) fn numbered(world: &World, request: Request, numbering: Option<Numbering>) -> Result<Self> {
+        let seed = Seed(request.seed);
+        let all_staged = || request.conditions.iter().map(|condition| condition.stage(world, seed));
+        let conditions = numbering.as_ref().map(|_| all_staged().collect::<Result<Vec<_>>>()).transpose()?;
+        let name = numbering.as_ref().and_then(|n| n.world.as_ref()).map(|w| w.world.as_str());
+        let (spots, grid) = spots(world, conditions.as_deref().unwrap_or_default(), name, &request)?;
         check_layout(&request, grid.as_ref())?;
         let projection = request.layout.layout().projection(
             request.size_px.map_or_else(|| world.projection(), |(width, height)| world.projection_of_size(width, height)),
@@ -144,10 +169,8 @@ impl Plan {
         if let Some(twice) = names.windows(2).find(|w| w[0] == w[1]) {
             return Err(invalid("--conditions", format!("`{}` twice", twice[0]), "each condition once"));
         }
-        let seed = Seed(request.seed);
         let mut stages = Vec::new();
-        for condition in &request.conditions {
-            let staged = condition.stage(world, seed)?;
+        for staged in conditions.map_or_else(|| all_staged().collect::<Result<Vec<_>>>(), Ok)? {
             let bodies = staged.world.body_poses();
             let (mut kept, mut left_out) = (Vec::new(), Vec::new());
             for (k, spot) in spots.iter().enumerate() {
@@ -158,11 +181,12 @@ impl Plan {
             }
             stages.push(Stage { staged, kept, left_out });
         }
+        let numbering = numbering.unwrap_or_else(|| Numbering { all_spots: spots.len(), ..Numbering::default() });
         let mut parts = Vec::new();
         for (stage, Stage { kept, .. }) in stages.iter().enumerate() {
             for first in (0..kept.len()).step_by(PART_FRAMES) {
                 let count = PART_FRAMES.min(kept.len() - first);
-                parts.push(Part { number: parts.len(), stage, first, count });
+                parts.push(Part { number: numbering.first_part + parts.len(), stage, first, count });
             }
         }
         if parts.is_empty() {
@@ -174,7 +198,7 @@ impl Plan {
                 Places::Grid { .. } | Places::Random(_) => Error::Invalid { what, found, allowed: needed },
             });
         }
-        Ok(Self { world: world.clone(), stages, parts, projection, request, spots, grid })
+        Ok(Self { world: world.clone(), stages, parts, projection, request, spots, grid, numbering })
     }
 
     /// What was asked for.
@@ -202,7 +226,9 @@ impl Plan {
         let (condition, kept) = (self.stages[stage].staged.condition.name(), &self.stages[stage].kept);
         kept.iter().map(move |&k| {
             let Spot { place, robot, time_s } = self.spots[k];
-            Frame { number: stage * self.spots.len() + k, spot: k, condition: condition.clone(), place, robot, time_s }
+            let Numbering { world, first_spot, all_spots, .. } = &self.numbering;
+            let (spot, world) = (first_spot + k, world.clone());
+            Frame { number: stage * all_spots + spot, spot, condition: condition.clone(), place, robot, time_s, world }
         })
     }
 
@@ -227,7 +253,6 @@ impl Plan {
         let (world, request) = (&self.world, &self.request);
         let heading_rad = self.spots.first().map(|s| s.robot.heading);
         let heading_rad = heading_rad.filter(|h| self.spots.iter().all(|s| s.robot.heading == *h));
-        let landmark = |id: u16| world.landmarks().iter().any(|b| b.instance == id);
         let conditions = self.stages.iter().map(|stage| ConditionDocument {
             name: stage.staged.condition.name(),
             given: stage.staged.condition.given().to_owned(),
@@ -258,12 +283,32 @@ impl Plan {
             poses_sha256: sha256(&self.spots.iter().flat_map(pose_bytes).collect::<Vec<u8>>()),
             heading_rad,
             grid: self.grid.clone(),
-            instances: world.instances().into_iter().map(|(id, name)| Instance { id, name, landmark: landmark(id) }).collect(),
+            instances: self.instances(),
             conditions: conditions.collect(),
             frames: self.frames(),
             parts: self.parts.len(),
             frames_per_part: PART_FRAMES,
+            series: None,
         }
+    }
+
+    fn instances(&self) -> Vec<Instance> {
+        let landmark = |id: u16| self.world.landmarks().iter().any(|b| b.instance == id);
+        self.world.instances().into_iter().map(|(id, name)| Instance { id, name, landmark: landmark(id) }).collect()
+    }
+
+    /// What the world of this plan is, in a set of several.
+    #[must_use]
+    pub fn world_document(&self) -> Option<WorldDocument> {
+        Some(WorldDocument {
+            named: self.numbering.world.clone()?,
+            sha256: self.world.sha256.clone(),
+            first_spot: self.numbering.first_spot,
+            spots: self.spots.len(),
+            camera_height_m: self.world.spec.camera.height_m,
+            home: self.world.home.into(),
+            instances: self.instances(),
+        })
     }
 }
 
@@ -272,7 +317,7 @@ fn pose_bytes(spot: &Spot) -> impl Iterator<Item = u8> + use<> {
     [x, y, heading, spot.time_s.unwrap_or(f64::NAN)].into_iter().flat_map(f64::to_le_bytes)
 }
 
-fn invalid(what: &str, found: impl Into<String>, allowed: impl Into<String>) -> Error {
+pub(super) fn invalid(what: &str, found: impl Into<String>, allowed: impl Into<String>) -> Error {
     Error::Invalid { what: what.into(), found: found.into(), allowed: allowed.into() }
 }
 
@@ -294,8 +339,10 @@ fn check_layout(request: &Request, grid: Option<&GridDocument>) -> Result<()> {
     }
 }
 
-fn spots(world: &World, request: &Request) -> Result<(Vec<Spot>, Option<GridDocument>)> {
-    let seed = Seed(request.seed);
+/// The poses of a set, and the grid that they are on. Random places are free in the world and under all of the conditions given; the
+/// name tells the draws of one world from those of another.
+fn spots(world: &World, staged: &[Staged], name: Option<&str>, request: &Request) -> Result<(Vec<Spot>, Option<GridDocument>)> {
+    let seed = name.map_or(Seed(request.seed), |name| Seed(request.seed).derive(&format!("dataset of {name}")));
     let mut grid = None;
     let (mut own, mut places): (bool, Vec<Spot>) = (true, Vec::new());
     match &request.places {
@@ -313,7 +360,8 @@ fn spots(world: &World, request: &Request) -> Result<(Vec<Spot>, Option<GridDocu
                 return Err(invalid("--random", count.to_string(), format!("1 to {MOST_PLACES}")));
             }
             own = false;
-            places = random_places(world, *count, &mut seed.stream("dataset/places"))?;
+            let worlds: Vec<&World> = std::iter::once(world).chain(staged.iter().map(|s| &s.world)).collect();
+            places = random_places(&worlds, *count, &mut seed.stream("dataset/places"))?;
         }
         Places::Trajectory(path) => {
             let file = if path.is_dir() { path.join("trajectory.csv") } else { path.clone() };
@@ -343,9 +391,11 @@ fn spots(world: &World, request: &Request) -> Result<(Vec<Spot>, Option<GridDocu
     Ok((spots.collect(), grid))
 }
 
-fn random_places(world: &World, count: usize, stream: &mut Stream) -> Result<Vec<Spot>> {
+/// Places where the robot can stand in all of some worlds that have the same outline.
+fn random_places(worlds: &[&World], count: usize, stream: &mut Stream) -> Result<Vec<Spot>> {
+    let world = worlds[0];
     let (low, high) = bounds(&world.outline);
-    let bodies = world.body_poses();
+    let bodies: Vec<Vec<Pose>> = worlds.iter().map(|w| w.body_poses()).collect();
     let mut places = Vec::with_capacity(count);
     let mut tries = 0;
     while places.len() < count {
@@ -358,7 +408,7 @@ fn random_places(world: &World, count: usize, stream: &mut Stream) -> Result<Vec
         tries += 1;
         let [u, v] = std::array::from_fn(|_| stream.random::<f64>());
         let robot = Pose::new(low.x + u * (high.x - low.x), low.y + v * (high.y - low.y), 0.0);
-        if world.is_free(&robot, 0.0, &bodies).is_ok() {
+        if worlds.iter().zip(&bodies).all(|(world, bodies)| world.is_free(&robot, 0.0, bodies).is_ok()) {
             places.push(Spot { place: None, robot, time_s: None });
         }
     }

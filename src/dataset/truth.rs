@@ -3,7 +3,7 @@
 use crate::error::{Error, Result};
 use crate::geometry::{Pose, Vector2, angle_of, cross, direction};
 use crate::panorama::{Panorama, Projection, Shot};
-use crate::panorama_set::{Frame, FrameTruth, LandmarkTruth};
+use crate::panorama_set::{Frame, FrameTruth, LandmarkTruth, WorldRef};
 use crate::table::Table;
 use crate::vision::{Extractor, ExtractorSettings};
 use crate::world::polygon::edges;
@@ -57,6 +57,7 @@ impl<'a> Witness<'a> {
             pose: frame.robot.into(),
             camera_m: [camera.x, camera.y, world.spec.camera.height_m],
             landmarks: landmarks(world, &camera, panorama),
+            world: frame.world.clone(),
         }
     }
 
@@ -192,6 +193,15 @@ pub fn tables(frames: &[(FrameTruth, Vec<TrueMatch>)], notes: &[(&str, String)])
         .reals("camera_z_m", of(|f| Some(f.camera_m[2])))
         .ints("landmarks_visible", frames.iter().map(|(f, _)| int(f.landmarks.iter().filter(|l| l.visible).count())))
         .ints("matches", frames.iter().map(|(_, m)| int(m.len())));
+    // A part holds frames of one world.
+    let about = if frames.iter().any(|(f, _)| f.world.is_some()) {
+        let of = |name: fn(&WorldRef) -> &String| {
+            frames.iter().map(move |(f, _)| f.world.as_ref().map(name).cloned().unwrap_or_default())
+        };
+        about.texts("world", of(|w| &w.world)).texts("kind", of(|w| &w.kind))
+    } else {
+        about
+    };
     let each = || frames.iter().flat_map(|(f, _)| f.landmarks.iter().map(move |l| (f, l)));
     let landmarks = Table::default()
         .ints("frame", each().map(|(f, _)| int(f.frame)))

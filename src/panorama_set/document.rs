@@ -7,7 +7,7 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use super::entry::FramePose;
+use super::entry::{FramePose, WorldRef};
 use super::grid::Place;
 use super::source;
 use crate::error::{Error, Result};
@@ -69,6 +69,39 @@ pub struct Document {
     pub parts: usize,
     /// Most frames of a part.
     pub frames_per_part: usize,
+    /// What a set of several worlds adds. Its `world` is the list of them as the command line has it, with the SHA-256 of their names
+    /// and files; home, height of the camera and instances are those of the first one, and `worlds/N.json` tells them of each.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub series: Option<SeriesDocument>,
+}
+
+/// The worlds of a set of several.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct SeriesDocument {
+    /// How many.
+    pub count: usize,
+    /// Poses in all of them together, in each condition; as many in every world, give or take one.
+    pub poses: usize,
+}
+
+/// A world of a set of several: `worlds/N.json`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct WorldDocument {
+    /// What rows name it.
+    #[serde(flatten)]
+    pub named: WorldRef,
+    /// SHA-256 of its file and its images.
+    pub sha256: String,
+    /// First of its spots, which have the same numbers in every condition.
+    pub first_spot: usize,
+    /// How many it has.
+    pub spots: usize,
+    /// Height of the camera above the floor, m.
+    pub camera_height_m: f64,
+    /// Home of the world in the room.
+    pub home: FramePose,
+    /// What instance ids stand for.
+    pub instances: Vec<Instance>,
 }
 
 /// A grid in the room: place (i, j) lies at `first_m` + ((j) s, -(i) s).

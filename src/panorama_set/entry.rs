@@ -24,6 +24,17 @@ pub struct Frame {
     pub robot: Pose,
     /// Time on a trajectory, s.
     pub time_s: Option<f64>,
+    /// The world, in a set of several.
+    pub world: Option<WorldRef>,
+}
+
+/// A world of a set of several, as rows name it.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct WorldRef {
+    /// What opens it: `office:17`, a path, or the name of a built-in world.
+    pub world: String,
+    /// By this, results are grouped: the kind of a generated world, the folder of a file in one, or the world's own name.
+    pub kind: String,
 }
 
 /// Names of a frame's files, relative to the set's folder; within the archive where there is one.
@@ -95,6 +106,9 @@ pub struct FrameTruth {
     pub camera_m: [f64; 3],
     /// The landmark bodies, in the world's order.
     pub landmarks: Vec<LandmarkTruth>,
+    /// The world, in a set of several.
+    #[serde(flatten, default, skip_serializing_if = "Option::is_none")]
+    pub world: Option<WorldRef>,
 }
 
 /// What is true of a landmark in a frame.
@@ -129,6 +143,8 @@ pub struct Entry {
     pub place: Option<Place>,
     /// Pose of the robot in the set's own frame (the room's, for a set that this program wrote), as far as the set tells.
     pub pose: Option<Pose>,
+    /// The world, in a set of several that this program wrote.
+    pub world: Option<WorldRef>,
     /// Picture, range and instances.
     pub(super) image: Source,
     pub(super) range: Option<Source>,
@@ -138,7 +154,8 @@ pub struct Entry {
 impl Entry {
     /// An entry of which no more is known than its files.
     pub(super) fn new(condition: &str, key: impl Into<String>, image: Source) -> Self {
-        Self { condition: condition.to_owned(), key: key.into(), place: None, pose: None, image, range: None, instance: None }
+        let (condition, key) = (condition.to_owned(), key.into());
+        Self { condition, key, place: None, pose: None, world: None, image, range: None, instance: None }
     }
 
     /// Takes place, pose and condition from a frame's truth as JSON; `path` is what errors name.
@@ -148,6 +165,7 @@ impl Entry {
         self.place = truth.place.map(|[i, j]| Place { i, j });
         self.pose = Some(truth.pose.into());
         self.condition = truth.condition;
+        self.world = truth.world;
         Ok(())
     }
 

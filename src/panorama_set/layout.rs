@@ -41,6 +41,11 @@ pub trait Layout: Sync {
         camera
     }
 
+    /// Whether a set of several worlds can be written in it: those layouts cannot that tell of one room for all frames.
+    fn holds_worlds(&self) -> bool {
+        false
+    }
+
     /// What keeps a set out of this layout, if anything does: what was found and what is allowed. `grid` is that of the set;
     /// `one_heading` says whether the robot looks one way at each place.
     fn refuses(&self, _grid: Option<&GridDocument>, _one_heading: bool) -> Option<(String, &'static str)> {

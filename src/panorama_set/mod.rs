@@ -23,11 +23,11 @@ mod set;
 mod source;
 mod yaml;
 
-pub use document::{ConditionDocument, DOCUMENT, Document, GridDocument, Instance, MOST_PLACES};
+pub use document::{ConditionDocument, DOCUMENT, Document, GridDocument, Instance, MOST_PLACES, SeriesDocument, WorldDocument};
 pub use encode::{
     Coding, encode_grey, encode_instance, encode_range, encode_rgb, modes, packed_instance, packed_range, packed_rgb,
 };
-pub use entry::{Entry, Frame, FramePose, FrameTruth, LandmarkTruth, Names};
+pub use entry::{Entry, Frame, FramePose, FrameTruth, LandmarkTruth, Names, WorldRef};
 pub use grid::{Cell, Grid, Place};
 pub use layout::Layout;
 pub use layouts::LayoutKind;

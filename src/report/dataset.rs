@@ -6,7 +6,7 @@ use crate::dataset::check::{FaultKind, Inspection};
 use crate::draw::sheet::Sheet;
 use crate::error::Result;
 use crate::panorama::{Panorama, ProjectionKind};
-use crate::panorama_set::{ConditionDocument, Document, GridDocument, Layout};
+use crate::panorama_set::{ConditionDocument, Document, GridDocument, Layout, SeriesDocument};
 
 /// The card of a set and its example pictures, by name.
 ///
@@ -28,7 +28,15 @@ fn card_text(layout: &dyn Layout, d: &Document) -> String {
     let config = |(name, files)| format!("- config_name: {name}\n  data_files: {files}\n");
     let condition = |c: &ConditionDocument| {
         let ConditionDocument { name, description, frames, left_out, .. } = c;
-        format!("| `{name}` | {description} | {frames} | {left_out} | ![{name}](home/{name}.rgb.png) |\n")
+        let first = if d.series.is_some() { "/000000" } else { "" };
+        format!("| `{name}` | {description} | {frames} | {left_out} | ![{name}](home/{name}{first}.rgb.png) |\n")
+    };
+    let series = |SeriesDocument { count, .. }: &SeriesDocument| {
+        format!(
+            "\nThere are {count} worlds, each with as many poses, give or take one; what is said here of one world is said of \
+             the first. Each row names its world and its kind. `worlds/N.json` tells of world N, from 0, what opens it, its home, the height \
+             of its camera, its spots and its instances; `home/CONDITION/N.rgb.png` is its home panorama.\n"
+        )
     };
     let grid = |g: &GridDocument| {
         let (GridDocument { rows, columns, spacing_m, first_m: [x, y], home }, s) = (g, g.spacing_m);
@@ -58,6 +66,7 @@ fn card_text(layout: &dyn Layout, d: &Document) -> String {
         seed = d.seed,
         renderer = d.renderer,
         conditions = d.conditions.iter().map(condition).collect::<String>(),
+        series = d.series.as_ref().map_or_else(String::new, series),
         grid = d.grid.as_ref().map_or_else(String::new, grid),
         layout = d.layout,
         files = layout.about_files(),

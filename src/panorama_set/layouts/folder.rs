@@ -20,6 +20,10 @@ impl Layout for Folder {
         "A frame is `CONDITION/N.rgb.png`, `.range.png`, `.instance.png` and `.json`; the same N is the same pose in every condition."
     }
 
+    fn holds_worlds(&self) -> bool {
+        true
+    }
+
     fn names(&self, frame: &Frame, _set: &Document) -> Names {
         Names::side_by_side(&format!("{}/{:06}", frame.condition, frame.spot))
     }

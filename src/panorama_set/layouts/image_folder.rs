@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Result};
 use crate::panorama_set::document::Document;
-use crate::panorama_set::entry::{Entry, Frame, FramePose, Names};
+use crate::panorama_set::entry::{Entry, Frame, FramePose, Names, WorldRef};
 use crate::panorama_set::grid::Place;
 use crate::panorama_set::layout::{Found, Layout, Search};
 use crate::storage::read_within;
@@ -31,6 +31,8 @@ struct Line {
     t_s: Option<f64>,
     #[serde(flatten)]
     pose: Option<FramePose>,
+    #[serde(flatten, default, skip_serializing_if = "Option::is_none")]
+    world: Option<WorldRef>,
 }
 
 fn stem(frame: &Frame) -> String {
@@ -41,6 +43,10 @@ impl Layout for ImageFolder {
     fn about_files(&self) -> &'static str {
         "Each condition's folder is an ImageFolder: pictures `N.png` and `metadata.jsonl`, which `datasets.load_dataset(\"imagefolder\", \
          data_dir=\"CONDITION\")` loads; range and instances of each lie in `truth/CONDITION/`."
+    }
+
+    fn holds_worlds(&self) -> bool {
+        true
     }
 
     fn names(&self, frame: &Frame, _set: &Document) -> Names {
@@ -56,6 +62,7 @@ impl Layout for ImageFolder {
                 column: frame.place.map(|p| p.j),
                 t_s: frame.time_s,
                 pose: Some(frame.robot.into()),
+                world: frame.world,
                 condition: frame.condition,
             };
             // Plain structs with text keys always serialise.
@@ -82,7 +89,7 @@ impl Layout for ImageFolder {
                 return Err(fault(k, format!("found `{}`, which is no file beside it", line.file_name)));
             }
             let place = line.row.zip(line.column).map(|(i, j)| Place { i, j });
-            Ok(Entry { place, pose: line.pose.map(Into::into), ..search.entry_with_truth_aside(picture) })
+            Ok(Entry { place, pose: line.pose.map(Into::into), world: line.world, ..search.entry_with_truth_aside(picture) })
         };
         let lines = bytes.split(|byte| *byte == b'\n').enumerate().filter(|(_, text)| !text.trim_ascii().is_empty());
         lines.map(entry).collect::<Result<_>>().map(Found::new)

@@ -35,6 +35,10 @@ impl Layout for Webdataset {
         true
     }
 
+    fn holds_worlds(&self) -> bool {
+        true
+    }
+
     fn names(&self, frame: &Frame, _set: &Document) -> Names {
         Names::side_by_side(&format!("{}-{:06}", frame.condition, frame.spot))
     }
