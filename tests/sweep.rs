@@ -237,6 +237,42 @@ fn a_study_may_draw_a_world_for_each_seed() {
     refused(&wayhome(at, &["sweep", "none.toml", "--out", "none"]).output().unwrap(), 1, &["castle"]);
 }
 
+/// The world as a table: a kind with its seeds is what `KIND:seed` and `seeds` are, and the files of a folder are levels of an axis.
+#[test]
+fn a_study_may_name_a_kind_or_a_folder_of_worlds() {
+    let base = tempfile::tempdir().unwrap();
+    let study = |world: &str, rest: &str| {
+        let path = base.path().join("study.toml");
+        let axis = "[[axes]]\nsetting = \"method\"\nvalues = [\"alv\", \"weber\"]";
+        fs::write(&path, format!("name = \"s\"\nworld = {world}\n{rest}\n[settings]\nbearings = \"ideal\"\n{axis}\n")).unwrap();
+        Study::open(&path.display().to_string(), None).map_err(|error| error.to_string())
+    };
+    let short = study("\"bare:seed\"", "seeds = \"2..5\"").unwrap();
+    for (world, seeds) in [("seeds = \"2..5\"", ""), ("", "seeds = \"2..5\""), ("seeds = \"2..5\"", "seeds = \"2..5\"")] {
+        let comma = if world.is_empty() { "" } else { ", " };
+        let long = study(&format!("{{ generate = \"bare\"{comma}{world} }}"), seeds).unwrap();
+        assert_eq!((&long.world, &long.seeds, &long.world_sha256), (&short.world, &short.seeds, &short.world_sha256));
+    }
+    fs::create_dir(base.path().join("rooms")).unwrap();
+    for (name, world) in [("b", "lab"), ("a", "crowd")] {
+        fs::write(base.path().join(format!("rooms/{name}.toml")), wayhome::world::World::open(world).unwrap().spec.to_toml())
+            .unwrap();
+    }
+    let folder = study("{ folder = \"rooms\" }", "seeds = \"1..2\"").unwrap();
+    assert_eq!((folder.axes[0].setting.as_str(), folder.axes[0].levels.listed().len()), ("world", 2));
+    for (world, rest, wanted) in [
+        ("{ generate = \"bare\", seeds = \"2..5\" }", "seeds = \"2..6\"", "seeds: found other seeds than those of `world`"),
+        ("{ generate = \"bare\", seeds = \"5..2\" }", "", "world.seeds: found \"5..2\""),
+        ("{ generate = \"castle\", seeds = \"2..5\" }", "", "castle"),
+        ("{ generate = \"bare\", seed = 3 }", "seeds = \"1..2\"", "world.seed: found an unknown field"),
+        ("{ folder = \"none\" }", "seeds = \"1..2\"", "world.folder: found \"none\""),
+        ("{ }", "seeds = \"1..2\"", "generate = \"KIND\""),
+    ] {
+        let message = study(world, rest).unwrap_err();
+        assert!(message.contains(wanted), "{world} {rest}: {message}");
+    }
+}
+
 #[test]
 fn built_in_studies_can_be_run() {
     for (name, cells, episodes) in [

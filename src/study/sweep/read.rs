@@ -1,7 +1,7 @@
 //! Study files: what a person writes, read and checked as a whole before anything runs; all faults come at once.
 
 use std::ops::RangeInclusive;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use strum::VariantArray;
 
@@ -15,6 +15,7 @@ use crate::error::{Error, Result};
 use crate::fault::Fault;
 use crate::render::RendererChoice;
 use crate::storage::io_error;
+use crate::world::WorldSource;
 
 /// Studies that the program carries with it, as (name, TOML text).
 const BUILTIN: [(&str, &str); 6] = [
@@ -113,6 +114,8 @@ struct Reader<'a> {
 
 /// Fields of the file, and of an axis.
 const FIELDS: [&str; 10] = ["name", "description", "world", "seed", "seeds", "design", "points", "settings", "axes", "compare"];
+/// The setting that is the world.
+const WORLD: &str = "world";
 const AXIS_FIELDS: [&str; 6] = ["setting", "label", "values", "from", "to", "scale"];
 
 impl<'a> Reader<'a> {
@@ -149,10 +152,16 @@ impl<'a> Reader<'a> {
         if name.is_empty() || !name.chars().all(|c| c.is_alphanumeric() || "-_".contains(c)) {
             self.fault(tree, "name", format!("\"{name}\""), "letters, digits, - and _");
         }
-        let world = self.world(tree)?;
-        let seeds = match seeds {
-            Some(seeds) => seeds,
-            None => self.seeds(tree)?,
+        let (world, own_seeds, files) = self.world(tree)?;
+        let seeds = match (seeds, own_seeds) {
+            (Some(seeds), _) => seeds,
+            (None, Some(own)) => {
+                if tree.get("seeds").is_some() && self.seeds(tree, "seeds")? != own {
+                    self.fault(tree, "seeds", "other seeds than those of `world`", "one of the two, or the same");
+                }
+                own
+            }
+            (None, None) => self.seeds(tree, "seeds")?,
         };
         let world_sha256 = match settings::open(&world, *seeds.start()).and_then(|draft| draft.world()) {
             Ok(world) => world.sha256,
@@ -173,7 +182,14 @@ impl<'a> Reader<'a> {
             },
         };
         let settings = self.settings(tree);
-        let axes = self.axes(tree);
+        let mut axes = if files.is_empty() || tree.get("axes").is_some() { self.axes(tree) } else { Vec::new() };
+        if !files.is_empty() {
+            if axes.iter().any(|axis| axis.setting == WORLD) {
+                self.fault(tree, "world", "a folder beside an axis \"world\"", "one of the two");
+            }
+            let values = files.into_iter().map(Value::Text).collect();
+            axes.insert(0, Axis { setting: WORLD.to_owned(), label: WORLD.to_owned(), levels: Levels::Listed(values) });
+        }
         let points = self.points(tree, design, &axes)?;
         let seed = self.whole(tree, "seed", 0)?;
         let compare = tree.get("compare").and_then(Node::text).unwrap_or("method").to_owned();
@@ -226,15 +242,49 @@ impl<'a> Reader<'a> {
         number
     }
 
-    /// A world file beside the study file, or what `World::open` takes.
-    fn world(&mut self, tree: &Node) -> Option<String> {
-        let given = self.text(tree, "world")?;
-        let beside: PathBuf = self.source.parent().unwrap_or(Path::new("")).join(given);
-        Some(if beside.is_file() { beside.to_string_lossy().into_owned() } else { given.to_owned() })
+    /// A world file beside the study file, or what `World::open` takes; a table that names a kind, of which each seed has a world, and
+    /// perhaps the seeds; or one that names a folder, whose files are the levels of an axis.
+    fn world(&mut self, tree: &Node) -> Option<(String, Option<RangeInclusive<u64>>, Vec<String>)> {
+        let beside = |given: &str| self.source.parent().unwrap_or(Path::new("")).join(given);
+        if let Some(node @ Node { value: Read::Table(_), .. }) = tree.get(WORLD) {
+            let (kind, folder) = (node.get("generate"), node.get("folder"));
+            self.known(tree, node, WORLD, &["generate", "seeds", "folder"]);
+            return match (kind.and_then(Node::text), folder.and_then(Node::text)) {
+                (Some(kind), None) => {
+                    let own = if node.get("seeds").is_some() { Some(self.seeds(tree, "world.seeds")?) } else { None };
+                    Some((format!("{kind}:seed"), own, Vec::new()))
+                }
+                (None, Some(given)) => {
+                    let path = beside(given);
+                    match WorldSource::parse(&path.to_string_lossy()) {
+                        Ok(source) if path.is_dir() => {
+                            let files: Vec<String> = source.iter().map(|world| world.argument).collect();
+                            Some((files[0].clone(), None, files))
+                        }
+                        Ok(_) => {
+                            self.fault(tree, "world.folder", format!("\"{given}\""), "a folder");
+                            None
+                        }
+                        Err(error) => {
+                            self.fault(tree, "world.folder", format!("\"{given}\""), error.to_string());
+                            None
+                        }
+                    }
+                }
+                _ => {
+                    let allowed = "generate = \"KIND\", perhaps with seeds = \"A..B\", or folder = \"FOLDER\"";
+                    self.fault(tree, WORLD, node.describe(), allowed);
+                    None
+                }
+            };
+        }
+        let given = self.text(tree, WORLD)?;
+        let file = beside(given);
+        Some((if file.is_file() { file.to_string_lossy().into_owned() } else { given.to_owned() }, None, Vec::new()))
     }
 
-    fn seeds(&mut self, tree: &Node) -> Option<RangeInclusive<u64>> {
-        let node = tree.get("seeds");
+    fn seeds(&mut self, tree: &Node, place: &str) -> Option<RangeInclusive<u64>> {
+        let node = place.split('.').try_fold(tree, |node, key| node.get(key));
         let range = node.and_then(Node::text).and_then(|text| {
             let (first, last) = text.split_once("..")?;
             let (first, last) = (first.parse::<u64>().ok()?, last.trim_start_matches('=').parse::<u64>().ok()?);
@@ -242,7 +292,7 @@ impl<'a> Reader<'a> {
         });
         if range.is_none() {
             let found = node.map_or_else(|| "nothing".to_owned(), Node::describe);
-            self.fault(tree, "seeds", found, "\"A..B\", both included, the first not above the last, which must be given");
+            self.fault(tree, place, found, "\"A..B\", both included, the first not above the last, which must be given");
         }
         range
     }
