@@ -13,7 +13,7 @@ use super::context::{Context, Verdict, open_folder, print, write_own};
 use super::values::{not_negative, pose, positive};
 
 /// Names of the files of an exported map.
-const FILES: &[&str] = &["map.yaml", "map.pgm"];
+const FILES: &[&str] = &["map.yaml", "map.pgm", "world.sdf"];
 
 /// Arguments of `world import`.
 #[derive(Debug, clap::Args)]
@@ -51,7 +51,7 @@ pub struct ExportArgs {
     /// Edge of a cell, m
     #[arg(long, value_name = "M", default_value_t = 0.05, value_parser = positive)]
     pub resolution_m: f64,
-    /// Folder for map.yaml and map.pgm [default: results/runs/map-WORLD]
+    /// Folder for map.yaml, map.pgm and world.sdf [default: results/runs/map-WORLD]
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
 }
@@ -152,6 +152,7 @@ pub fn export(args: &ExportArgs, context: &Context) -> Result<Verdict> {
     ];
     folder.write("map.pgm", &map.pgm())?;
     folder.write("map.yaml", map.description("map.pgm", &comments).as_bytes())?;
+    folder.write("world.sdf", world.to_sdf().as_bytes())?;
     folder.finish()?;
     let output = ExportOutput {
         columns: map.columns,

@@ -29,7 +29,7 @@ pub enum WorldCommand {
     Generate(Box<super::generate::GenerateArgs>),
     /// Make a world of a ROS or Nav2 map, or of a floor plan
     Import(Box<super::map::ImportArgs>),
-    /// Draw a world as a map for ROS and Nav2: map.yaml and map.pgm
+    /// Write a world as a map for ROS and Nav2, map.yaml and map.pgm, and for Gazebo, world.sdf
     Export(super::map::ExportArgs),
     /// Draw a world from above as SVG
     Plot {
@@ -77,6 +77,10 @@ pub fn run(args: &WorldArgs, context: &Context) -> Result<Verdict> {
 }
 
 fn check(world: &World, context: &Context) -> Result<()> {
+    let faults = world.unreachable_starts();
+    if !faults.is_empty() {
+        return Err(wayhome::Error::World { path: world.source.clone(), faults }.into());
+    }
     let checked = Checked {
         ok: true,
         name: &world.spec.name,
