@@ -3,7 +3,9 @@
 //! [`WorldSpec`] is the file as written, [`World`] the checked form: absolute corners, radians, instance ids. Loading reports
 //! every fault of a file at once; see [`Fault`](crate::fault::Fault). It goes through three gates: the text becomes a tree that knows its
 //! lines ([`document`](crate::document)), the tree is compared with the schema (`structure`), and the spec's values and places are checked
-//! (`validate`); the images that it shows are read on the way (`picture`). A [`World`] also tells where a robot may stand and start (`free`).
+//! (`validate`); the images that it shows are read on the way (`picture`). A [`World`] also tells where a robot may stand and start (`free`)
+//! and whether it can drive home from there (`reach`). Worlds are drawn by seed ([`generate`]), made of maps and written as such
+//! ([`map`]), and written for Gazebo (`sdf`).
 //!
 //! Knows of: geometry, panoramas' projections and located documents. Must not know of rapier, wgpu or anything that moves.
 
