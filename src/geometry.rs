@@ -9,6 +9,7 @@
 use std::f64::consts::{PI, TAU};
 
 pub use nalgebra::{Matrix3, Vector2};
+use serde::Serialize;
 
 /// Sine and cosine of `angle_rad`.
 #[must_use]
@@ -57,14 +58,17 @@ pub fn cross(a: Vector2<f64>, b: Vector2<f64>) -> f64 {
     a.x * b.y - a.y * b.x
 }
 
-/// Position (m) and heading (rad) of a frame in the plane.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+/// Position (m) and heading (rad) of a frame in the plane. Files call them `x_m`, `y_m` and `heading_rad`.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct Pose {
     /// Position along x, m.
+    #[serde(rename = "x_m")]
     pub x: f64,
     /// Position along y, m.
+    #[serde(rename = "y_m")]
     pub y: f64,
     /// Heading, rad, anti-clockwise from x.
+    #[serde(rename = "heading_rad")]
     pub heading: f64,
 }
 

@@ -9,7 +9,6 @@ use wayhome::Error;
 use wayhome::dataset::film::{self, Frame};
 use wayhome::draw::image::{colours_png, instance_png, range_png};
 use wayhome::draw::sheet::Sheet;
-use wayhome::episode::PoseRecord;
 use wayhome::geometry::{Pose, Twist};
 use wayhome::panorama::{Panorama, Projection};
 use wayhome::random::Seed;
@@ -108,7 +107,7 @@ fn projection(args: &RenderArgs, world: &World) -> Projection {
 #[derive(Serialize)]
 struct Meta<'a> {
     #[serde(skip_serializing_if = "Option::is_none")]
-    pose: Option<PoseRecord>,
+    pose: Option<Pose>,
     projection: Projection,
     camera_height_m: f64,
     light: LightPreset,
@@ -130,7 +129,7 @@ struct Meta<'a> {
 struct FrameRecord {
     number: usize,
     t_s: f64,
-    pose: PoseRecord,
+    pose: Pose,
 }
 
 /// What an instance id stands for.
@@ -189,7 +188,7 @@ fn still(args: &RenderArgs, context: &Context, world: &World, pose: Pose) -> Res
     for (name, bytes) in encode(&panorama, "")? {
         folder.write(&name, &bytes)?;
     }
-    let meta = Meta { pose: Some(pose.into()), ..Meta::new(args, world, &take) };
+    let meta = Meta { pose: Some(pose), ..Meta::new(args, world, &take) };
     folder.write("meta.json", json(&meta).as_bytes())?;
     folder.finish()?;
     let what = format!("panorama from ({:.3}, {:.3}) m", pose.x, pose.y);
@@ -224,7 +223,7 @@ fn film(args: &RenderArgs, context: &Context, world: &World, path: &Path) -> Res
         Ok(())
     })?;
     drop(bar);
-    let record = |(number, f): (usize, &Frame)| FrameRecord { number, t_s: f.time_s, pose: f.robot.into() };
+    let record = |(number, f): (usize, &Frame)| FrameRecord { number, t_s: f.time_s, pose: f.robot };
     let meta = Meta { frames: Some(frames.iter().enumerate().map(record).collect()), ..Meta::new(args, world, &take) };
     folder.write("meta.json", json(&meta).as_bytes())?;
     folder.finish()?;
@@ -236,7 +235,7 @@ fn sheet(args: &RenderArgs, context: &Context, world: &World, pose: Option<Pose>
     /// What `--json` prints.
     #[derive(Serialize)]
     struct Shown {
-        poses: Vec<PoseRecord>,
+        poses: Vec<Pose>,
     }
     /// Pictures on a sheet.
     const PICTURES: usize = 6;
@@ -261,8 +260,8 @@ fn sheet(args: &RenderArgs, context: &Context, world: &World, pose: Option<Pose>
     }
     folder.write("sheet.png", &sheet.png("sheet.png")?)?;
     folder.finish()?;
-    let shown = Shown { poses: poses.iter().map(|p| (*p).into()).collect() };
-    context.print_made(&shown, &out, || format!("{} panoramas on {}\n", poses.len(), out.join("sheet.png").display()))
+    let shown = Shown { poses };
+    context.print_made(&shown, &out, || format!("{} panoramas on {}\n", shown.poses.len(), out.join("sheet.png").display()))
 }
 
 /// The frames of a way on which the camera never is outside the room or in a body.

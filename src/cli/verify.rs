@@ -8,7 +8,7 @@ use serde::Serialize;
 use strum::VariantArray;
 use wayhome::Error;
 use wayhome::draw::image::{colours_png, instance_png, range_png};
-use wayhome::episode::PoseRecord;
+use wayhome::geometry::Pose;
 use wayhome::panorama::Projection;
 use wayhome::storage::{OutputFolder, write_atomically};
 use wayhome::verify::vision::condition::Factor;
@@ -217,7 +217,7 @@ struct PairRecord {
     /// Start of its files' names.
     name: String,
     distance_m: f64,
-    pose: PoseRecord,
+    pose: Pose,
     projection: Projection,
 }
 
@@ -239,7 +239,7 @@ fn write_pair(folder: &Path, pair: &Pair<'_>) -> Result<PairRecord, Error> {
         world: world.clone(),
         name,
         distance_m: pair.distance_m,
-        pose: pair.shot.pose.into(),
+        pose: pair.shot.pose,
         projection: panorama.projection,
     })
 }

@@ -24,4 +24,4 @@ pub use record::{Belief, Outcome, Pictures, Record, Step, Timing};
 pub use recorder::{Moment, Recorder};
 pub use setup::{Look, PlantKind, SensorKind, Setup, Start, StopRule};
 pub use simulation::{Phase, Progress, Simulation, Watch};
-pub use summary::{BeliefError, CollisionRecord, EstimateErrors, Landmarks, PoseRecord, SetupRecord, Summary};
+pub use summary::{BeliefError, CollisionRecord, EstimateErrors, Landmarks, SetupRecord, Summary};

@@ -11,7 +11,7 @@ use serde::Serialize;
 use super::parts::Parts;
 use super::setup::{PlantKind, Setup, Start};
 use super::simulation::Simulation;
-use super::summary::{CollisionRecord, PoseRecord};
+use super::summary::CollisionRecord;
 use crate::error::{Error, Result};
 use crate::geometry::{Pose, Twist, wrap};
 use crate::physics::{Collision, Plant, WheelState};
@@ -209,11 +209,11 @@ pub struct DriveSummary {
     /// How long it took, s.
     pub time_s: f64,
     /// True pose at the start, in the room.
-    pub start: PoseRecord,
+    pub start: Pose,
     /// True pose at the end.
-    pub end: PoseRecord,
+    pub end: Pose,
     /// Pose at the end by odometry alone.
-    pub odometry_end: PoseRecord,
+    pub odometry_end: Pose,
     /// Distance at the end between odometry and truth, m.
     pub odometry_drift_m: f64,
     /// Difference of heading at the end, odometry less truth, rad.
@@ -245,9 +245,9 @@ impl DriveSummary {
     fn new(start: &DriveStep, world: &World, commands: &Commands, seed: Seed) -> Self {
         Self {
             time_s: 0.0,
-            start: start.truth.into(),
-            end: start.truth.into(),
-            odometry_end: start.dead_reckoned.into(),
+            start: start.truth,
+            end: start.truth,
+            odometry_end: start.dead_reckoned,
             odometry_drift_m: 0.0,
             odometry_heading_drift_rad: 0.0,
             path_length_m: 0.0,
@@ -267,8 +267,8 @@ impl DriveSummary {
     fn add(&mut self, before: &DriveStep, step: &DriveStep, collisions: &[Collision], world: &World) {
         let [left, right] = step.wheels.floor.slip_m_s;
         self.time_s = step.time_s;
-        self.end = step.truth.into();
-        self.odometry_end = step.dead_reckoned.into();
+        self.end = step.truth;
+        self.odometry_end = step.dead_reckoned;
         self.odometry_drift_m = (step.dead_reckoned.position() - step.truth.position()).norm();
         self.odometry_heading_drift_rad = wrap(step.dead_reckoned.heading - step.truth.heading);
         self.path_length_m += (step.truth.position() - before.truth.position()).norm();

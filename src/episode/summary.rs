@@ -40,9 +40,9 @@ pub struct Summary {
     /// True distance from start to home, m.
     pub start_distance_m: f64,
     /// True pose at the start, in the room.
-    pub start: PoseRecord,
+    pub start: Pose,
     /// Home pose, in the room.
-    pub home: PoseRecord,
+    pub home: Pose,
     /// Contacts with walls and bodies.
     pub collisions: usize,
     /// Each of them.
@@ -71,17 +71,6 @@ pub struct Summary {
     pub version: &'static str,
 }
 
-/// A pose as JSON has it.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct PoseRecord {
-    /// x, m.
-    pub x_m: f64,
-    /// y, m.
-    pub y_m: f64,
-    /// Heading, rad.
-    pub heading_rad: f64,
-}
-
 /// A contact with a wall or body as JSON has it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct CollisionRecord {
@@ -98,12 +87,6 @@ impl CollisionRecord {
     pub fn list(collisions: &[Collision], world: &World) -> Vec<Self> {
         let record = |c: &Collision| Self { time_s: c.time_s, with: c.with.name(world), impulse_n_s: c.impulse_n_s };
         collisions.iter().map(record).collect()
-    }
-}
-
-impl From<Pose> for PoseRecord {
-    fn from(pose: Pose) -> Self {
-        Self { x_m: pose.x, y_m: pose.y, heading_rad: pose.heading }
     }
 }
 
@@ -216,8 +199,8 @@ impl Summary {
             time_ratio,
             path_length_m: record.steps.windows(2).map(|w| (w[1].truth.position() - w[0].truth.position()).norm()).sum(),
             start_distance_m,
-            start: start.into(),
-            home: record.home.into(),
+            start,
+            home: record.home,
             collisions: record.collisions.len(),
             collision_list: CollisionRecord::list(&record.collisions, world),
             odometry_drift_m: record.odometry_drift_m(),

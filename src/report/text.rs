@@ -4,7 +4,8 @@ use std::fmt::Write;
 use std::path::Path;
 
 use crate::episode::open_loop::DriveSummary;
-use crate::episode::{Outcome, PoseRecord, Summary};
+use crate::episode::{Outcome, Summary};
+use crate::geometry::Pose;
 use crate::study::row::RunRow;
 use crate::study::seeds::SeedsSummary;
 use crate::study::tally::{Spread, Tally};
@@ -33,9 +34,9 @@ pub fn run(summary: &Summary, folder: &Path) -> String {
         format!(
             "{:.2} m from home: ({:.3}, {:.3}) m, {:.1} deg",
             s.start_distance_m,
-            s.start.x_m,
-            s.start.y_m,
-            s.start.heading_rad.to_degrees()
+            s.start.x,
+            s.start.y,
+            s.start.heading.to_degrees()
         ),
     ));
     rows.push(("path", format!("{:.2} m, {} collisions", s.path_length_m, s.collisions)));
@@ -82,7 +83,7 @@ const MOST_COLLISIONS: usize = 20;
 /// An open-loop drive.
 pub fn drive(summary: &DriveSummary, folder: &Path) -> String {
     let s = summary;
-    let pose = |p: &PoseRecord| format!("({:.3}, {:.3}) m, {:.1} deg", p.x_m, p.y_m, p.heading_rad.to_degrees());
+    let pose = |p: &Pose| format!("({:.3}, {:.3}) m, {:.1} deg", p.x, p.y, p.heading.to_degrees());
     let mut rows = vec![
         ("start", pose(&s.start)),
         ("end", pose(&s.end)),

@@ -277,8 +277,8 @@ impl Standing {
             .iter()
             .zip(vectors)
             .map(|(run, vector)| GridStart {
-                x_m: run.start.x_m,
-                y_m: run.start.y_m,
+                x_m: run.start.x,
+                y_m: run.start.y,
                 outcome: run.outcome,
                 vector_rad: vector.map(|v| v.0),
                 vector_error_rad: vector.map(|v| v.1),

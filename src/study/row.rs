@@ -90,9 +90,9 @@ run_row! {
         time_ratio, "The one over the other, of runs that reached home.", |s| s.time_ratio;
         path_length_m, "Length of the true path, m.", |s| s.path_length_m;
         initial_distance_m, "Distance from home at the start, m.", |s| s.start_distance_m;
-        start_x_m, "x of the start in the room, m.", |s| s.start.x_m;
-        start_y_m, "y of the start in the room, m.", |s| s.start.y_m;
-        start_heading_rad, "Heading at the start in the room, rad.", |s| s.start.heading_rad;
+        start_x_m, "x of the start in the room, m.", |s| s.start.x;
+        start_y_m, "y of the start in the room, m.", |s| s.start.y;
+        start_heading_rad, "Heading at the start in the room, rad.", |s| s.start.heading;
         odometry_drift_m, "Distance at the end between odometry alone and the truth, m.", |s| s.odometry_drift_m;
         range_error_m, "Error of the last estimate's range, m.", |s| s.estimate.map(|e| e.range_error_m);
         bearing_error_rad, "Error of its bearing from home, rad.", |s| s.estimate.map(|e| e.bearing_error_rad);
