@@ -15,7 +15,7 @@ use mcap::{McapError, WriteOptions, Writer};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::file::{self, Kind, MAKER};
+use super::file::{self, MAKER};
 use super::messages::{self, Command, Diagnostics, nanoseconds, timestamp, turn, vector};
 use super::scene;
 use crate::draw::image::colours_jpeg;
@@ -27,7 +27,8 @@ use crate::panorama::Panorama;
 use crate::storage::PartialFile;
 use crate::world::World;
 
-pub(super) const KIND: Kind = Kind { magic: b"\x89MCAP0\r\n" };
+/// First bytes of such a file.
+pub(super) const MAGIC: &[u8] = b"\x89MCAP0\r\n";
 
 /// Quality of panoramas: a fifth of what they take as PNG, and no difference to be seen.
 const JPEG_QUALITY: u8 = 90;
@@ -182,7 +183,7 @@ struct Tape {
 
 impl Tape {
     fn create(path: &Path) -> Result<Self> {
-        let file = file::create(path, &KIND)?;
+        let file = file::create(path, MAGIC)?;
         let writer = WriteOptions::new().library(MAKER).create(file).map_err(|e| fault(path, e))?;
         Ok(Self { path: path.to_owned(), writer, channels: BTreeMap::new(), buffer: Vec::new() })
     }

@@ -44,7 +44,7 @@ impl Format {
     /// When this build has no such recording, the folder of the file is not there, a file is there that no earlier run has recorded, or it would lie among the other
     /// results.
     pub fn check(self, path: &Path, out: &Path) -> Result<()> {
-        file::check(path, self.kind()?)?;
+        file::check(path, self.magic()?)?;
         let (own, results) = (file::folder_of(path).canonicalize(), out.canonicalize());
         if own.is_ok_and(|own| results.is_ok_and(|results| own == results)) {
             return Err(Error::Invalid {
@@ -74,12 +74,12 @@ impl Format {
         }
     }
 
-    fn kind(self) -> Result<&'static file::Kind> {
+    fn magic(self) -> Result<&'static [u8]> {
         match self {
             #[cfg(feature = "recording")]
-            Self::Mcap => Ok(&mcap_file::KIND),
+            Self::Mcap => Ok(mcap_file::MAGIC),
             #[cfg(feature = "video")]
-            Self::Gif => Ok(&video::KIND),
+            Self::Gif => Ok(video::MAGIC),
             #[cfg(not(all(feature = "recording", feature = "video")))]
             _ => Err(self.off()),
         }

@@ -13,7 +13,7 @@ use gif::{AnyExtension, DisposalMethod, Encoder, EncodingError, Extension, Frame
 use image::imageops::FilterType;
 use image::{Rgb, RgbImage};
 
-use super::file::{self, Kind, MAKER};
+use super::file::{self, MAKER};
 use crate::draw::image::colours;
 use crate::draw::raster::{RoomRaster, Sight, opaque};
 use crate::episode::{Moment, Record, Recorder, Summary};
@@ -25,7 +25,8 @@ use crate::record::path_plot::in_room;
 use crate::storage::PartialFile;
 use crate::world::World;
 
-pub(super) const KIND: Kind = Kind { magic: b"GIF89a" };
+/// First bytes of such a file.
+pub(super) const MAGIC: &[u8] = b"GIF89a";
 
 /// Width of the picture, and greatest height of the room, px.
 const WIDTH_PX: u32 = 720;
@@ -60,7 +61,7 @@ pub(super) struct VideoRecording<'a> {
 
 impl<'a> VideoRecording<'a> {
     pub(super) fn create(world: &'a World, path: &Path) -> Result<Self> {
-        let file = file::create(path, &KIND)?;
+        let file = file::create(path, MAGIC)?;
         let pixels = 4 * (WIDTH_PX as usize) * (ROOM_PX as usize);
         let room = RoomRaster::new(world, WIDTH_PX, ROOM_PX).ok_or(Error::Memory { bytes: pixels })?;
         Ok(Self {
@@ -319,7 +320,7 @@ mod tests {
             (0..8).for_each(|d| picture.put_pixel(10 + k * 7 + d, 12 + d, Rgb([213, 94, 0])));
             picture
         };
-        let mut film = Film::begin(file::create(&path, &KIND).unwrap(), &picture(0)).unwrap();
+        let mut film = Film::begin(file::create(&path, MAGIC).unwrap(), &picture(0)).unwrap();
         for (k, time_s) in [(0, 0.0), (1, 0.2), (2, 0.4), (3, 1.2)] {
             film.show(time_s, picture(k)).unwrap();
         }

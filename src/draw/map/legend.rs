@@ -31,13 +31,6 @@ pub(super) struct Legend {
     entries: Vec<(Swatch, String)>,
 }
 
-/// A legend on the page.
-pub(super) struct Drawn {
-    pub group: Group,
-    /// Where it ends, px.
-    pub bottom_px: f64,
-}
-
 /// Size of the text, px.
 const SIZE_PX: f64 = 12.0;
 /// Height of a row, px.
@@ -54,8 +47,8 @@ impl Legend {
         }
     }
 
-    /// Draws the legend in columns from `top` px down.
-    pub(super) fn draw(&self, top: f64, page_width: f64) -> Drawn {
+    /// The legend in columns from `top` px down, and where it ends, px.
+    pub(super) fn draw(&self, top: f64, page_width: f64) -> (Group, f64) {
         // As many equal columns as the longest entry allows, filled row by row.
         let width_of = |label: &str| SWATCH_PX + 0.6 * SIZE_PX * label.chars().count() as f64 + 18.0;
         let widest = self.entries.iter().map(|(_, label)| width_of(label)).fold(1.0, f64::max);
@@ -70,7 +63,7 @@ impl Legend {
             let y = top + ((k / columns) as f64 + 0.5) * ROW_PX + 6.0;
             group = group.add(swatch.draw(x, y)).add(text(label, x + SWATCH_PX, y + 4.0, SIZE_PX).set("fill", INK));
         }
-        Drawn { group, bottom_px: top + rows as f64 * ROW_PX + 16.0 }
+        (group, top + rows as f64 * ROW_PX + 16.0)
     }
 }
 

@@ -154,7 +154,7 @@ impl MapDrawing {
         let top = if self.title.is_some() { 44.0 } else { 16.0 };
         let unexplained = Legend::default();
         let legend = if self.has_legend { &self.legend } else { &unexplained };
-        let legend = legend.draw(top + self.frame.height_px() + frame::AXIS_PX, WIDTH_PX);
+        let (legend, bottom_px) = legend.draw(top + self.frame.height_px() + frame::AXIS_PX, WIDTH_PX);
         let map = Group::new()
             .set("transform", format!("translate(0 {top})"))
             .add(self.floor.clone())
@@ -165,13 +165,13 @@ impl MapDrawing {
             .add(self.markers.clone())
             .add(self.labels.draw())
             .add(self.frame.draw_axes());
-        let white = rectangle([0.0, 0.0, WIDTH_PX, legend.bottom_px]).set("fill", "#ffffff");
-        let mut document = page(WIDTH_PX, legend.bottom_px).add(white);
+        let white = rectangle([0.0, 0.0, WIDTH_PX, bottom_px]).set("fill", "#ffffff");
+        let mut document = page(WIDTH_PX, bottom_px).add(white);
         if let Some(title) = &self.title {
             let text = text(title, frame::LEFT_PX, 26.0, 16.0).set("font-weight", "bold").set("fill", INK);
             document = document.add(text);
         }
-        document.add(map).add(legend.group).to_string() + "\n"
+        document.add(map).add(legend).to_string() + "\n"
     }
 }
 

@@ -46,24 +46,13 @@ pub(super) enum Silence {
     Unasked,
 }
 
-/// The end of what a program wrote to stderr.
-#[derive(Default)]
-struct Tail(Vec<u8>);
-
-impl Tail {
-    fn push(&mut self, bytes: &[u8]) {
-        self.0.extend_from_slice(bytes);
-        let surplus = self.0.len().saturating_sub(STDERR_TAIL);
-        self.0.drain(..surplus);
-    }
-}
-
 /// A program that was started and will be ended when this is dropped.
 pub(super) struct Child {
     process: process::Child,
     to_program: Option<Sender<Vec<u8>>>,
     lines: Receiver<Option<Vec<u8>>>,
-    stderr: Arc<Mutex<Tail>>,
+    /// The end of what it wrote to stderr.
+    stderr: Arc<Mutex<Vec<u8>>>,
     /// Disconnects when stderr ends.
     stderr_open: Receiver<()>,
     status: Option<ExitStatus>,
@@ -115,7 +104,7 @@ impl Child {
                 }
             }
         });
-        let stderr = Arc::new(Mutex::new(Tail::default()));
+        let stderr = Arc::<Mutex<Vec<u8>>>::default();
         let (stderr_ends, stderr_open) = channel();
         let tail = Arc::clone(&stderr);
         thread::spawn(move || {
@@ -123,7 +112,10 @@ impl Child {
             let Some(mut pipe) = stderr_pipe else { return };
             let mut block = [0; 4096];
             while let Ok(count @ 1..) = pipe.read(&mut block) {
-                lock(&tail).push(&block[..count]);
+                let mut tail = lock(&tail);
+                tail.extend_from_slice(&block[..count]);
+                let surplus = tail.len().saturating_sub(STDERR_TAIL);
+                tail.drain(..surplus);
             }
         });
         Ok(Self { process, to_program: Some(to_program), lines, stderr, stderr_open, status: None, patience: GRACE })
@@ -176,7 +168,7 @@ impl Child {
     pub(super) fn last_words(&self) -> (Option<ExitStatus>, String) {
         let _ends_or_times_out = self.stderr_open.recv_timeout(LAST_WORDS);
         let tail = lock(&self.stderr);
-        (self.status, String::from_utf8_lossy(&tail.0).trim().to_owned())
+        (self.status, String::from_utf8_lossy(&tail).trim().to_owned())
     }
 }
 

@@ -18,7 +18,7 @@ mod value;
 
 pub use design::{Design, SOBOL_AXES};
 pub use rows::Row;
-pub use run::{Exhibit, Failure, Store, exhibits, replay, run};
+pub use run::{Exhibit, Store, exhibits, replay, run};
 pub use settings::{Setting, catalogue};
 pub use spec::{Axis, Chunk, Levels, MOST_EPISODES, Study};
 pub use value::Value;

@@ -21,11 +21,11 @@ pub trait Store: Sync {
     /// When they cannot be kept; the study then ends.
     fn keep(&self, chunk: &Chunk, rows: &[Row]) -> Result<()>;
 
-    /// Keeps the full record of an episode that did not end at home.
+    /// Keeps the full record of an episode that ran in `world` and did not end at home, and the same in numbers.
     ///
     /// # Errors
     /// When it cannot be kept; the study then ends.
-    fn keep_failure(&self, failure: &Failure<'_>) -> Result<()>;
+    fn keep_failure(&self, row: &Row, world: &World, record: &Record, summary: &Summary) -> Result<()>;
 }
 
 /// Keeps rows in memory, in the order in which chunks end, and no records.
@@ -35,22 +35,9 @@ impl Store for Mutex<Vec<Row>> {
         Ok(())
     }
 
-    fn keep_failure(&self, _failure: &Failure<'_>) -> Result<()> {
+    fn keep_failure(&self, _: &Row, _: &World, _: &Record, _: &Summary) -> Result<()> {
         Ok(())
     }
-}
-
-/// An episode that ran and did not end at home.
-#[derive(Clone, Copy)]
-pub struct Failure<'a> {
-    /// Its row.
-    pub row: &'a Row,
-    /// The world.
-    pub world: &'a World,
-    /// What happened.
-    pub record: &'a Record,
-    /// The same in numbers.
-    pub summary: &'a Summary,
 }
 
 /// Runs chunks of a study and hands their rows to `store`, a whole chunk at once.
@@ -125,7 +112,7 @@ impl Episode<'_> {
             Ok((record, summary)) => {
                 let row = Row::of(self.number, self.cell, self.values, &summary);
                 if !row.run.is_home() {
-                    store.keep_failure(&Failure { row: &row, world, record: &record, summary: &summary })?;
+                    store.keep_failure(&row, world, &record, &summary)?;
                 }
                 row
             }

@@ -11,13 +11,14 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use crate::episode::Recorder;
+use crate::episode::{Record, Recorder, Summary};
 use crate::error::{Error, Result};
 use crate::record::run::RunFiles;
 use crate::storage::{MARKER, PARTIAL, files, io_error, json, remove, write_atomically};
 use crate::study::sweep::merge::{Identity, merge};
-use crate::study::sweep::{Chunk, Failure, Row, Store, Study, rows};
+use crate::study::sweep::{Chunk, Row, Store, Study, rows};
 use crate::table::Table;
+use crate::world::World;
 
 /// Content of the folder's marker.
 const VERB: &str = "sweep";
@@ -284,12 +285,12 @@ impl Store for StudyFolder {
         write_atomically(&self.part(chunk.index), &self.parquet(rows)?)
     }
 
-    fn keep_failure(&self, failure: &Failure<'_>) -> Result<()> {
+    fn keep_failure(&self, row: &Row, world: &World, record: &Record, summary: &Summary) -> Result<()> {
         if !self.keep_failures {
             return Ok(());
         }
-        let path = self.path.join(FAILURES).join(format!("{:08}", failure.row.episode));
-        RunFiles::open(&path, "sweep --keep-failures", failure.world)?.finish(failure.record, failure.summary)
+        let path = self.path.join(FAILURES).join(format!("{:08}", row.episode));
+        RunFiles::open(&path, "sweep --keep-failures", world)?.finish(record, summary)
     }
 }
 
