@@ -196,9 +196,9 @@ mod tests {
         assert_eq!(kind(crate::world::World::open("no-such-world").unwrap_err()), ErrorKind::Usage);
         assert_eq!(kind(world("name = 1")), ErrorKind::Input);
         std::fs::write(folder.path().join("thesis.tex"), "mine").unwrap();
-        let taken = crate::storage::OutputFolder::open(folder.path(), "home", &["summary.json"]).unwrap_err();
+        let taken = crate::storage::OutputFolder::open(folder.path(), "home").unwrap_err();
         assert_eq!(kind(taken), ErrorKind::Input);
-        let below = crate::storage::OutputFolder::open(&folder.path().join("thesis.tex/below"), "home", &[]).unwrap_err();
+        let below = crate::storage::OutputFolder::open(&folder.path().join("thesis.tex/below"), "home").unwrap_err();
         assert_eq!(kind(below), ErrorKind::Environment);
         if cfg!(unix) {
             assert_eq!(kind(crate::storage::check_room(folder.path(), u64::MAX, "a set").unwrap_err()), ErrorKind::Environment);

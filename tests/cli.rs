@@ -545,7 +545,7 @@ fn the_physics_page_holds_its_closed_forms() {
     let marker = folder.path().join("page/.wayhome");
     std::fs::write(&marker, "physics-report\n").unwrap();
     assert_done(&run(folder.path(), &["physics-report", "--out", "page"]));
-    assert_eq!(std::fs::read_to_string(marker).unwrap(), "verify physics\n");
+    assert!(std::fs::read_to_string(marker).unwrap().starts_with("verify physics\n"));
     assert_fails(&run(folder.path(), &["verify", "vision", "--out", "page"]), 1, &["verify physics"]);
 }
 

@@ -60,7 +60,7 @@ pub fn run(args: &CompareArgs, context: &Context) -> Result<Verdict> {
     let setup = Setup { compass_sd_rad: Some(setup.compass_sd_rad.unwrap_or(0.0)), ..setup };
     let world = args.changes.open(&args.world)?;
     let parts = ["compare", &world.spec.name, &range(&args.seeds)];
-    let (out, folder) = open_folder(args.out.as_deref(), &parts, "compare", report::FILES)?;
+    let (out, folder) = open_folder(args.out.as_deref(), &parts, "compare")?;
     let places = usize::from(args.places);
     let bar = context.progress(Some(runs(&world, contenders.len(), &args.seeds, places)))?;
     let watch = |contender: &Contender| bar.done(contender.key.to_string());

@@ -232,13 +232,8 @@ pub fn write_own(path: &Path, text: &str, head: &str) -> Result<()> {
 }
 
 /// Opens the folder for the results of `verb`: the one given, or else that of [`folder_or`].
-pub fn open_folder(
-    given: Option<&Path>,
-    parts: &[&str],
-    verb: &str,
-    files: &'static [&'static str],
-) -> Result<(PathBuf, OutputFolder)> {
+pub fn open_folder(given: Option<&Path>, parts: &[&str], verb: &str) -> Result<(PathBuf, OutputFolder)> {
     let path = folder_or(given, parts);
-    let folder = OutputFolder::open(&path, verb, files)?;
+    let folder = OutputFolder::open(&path, verb)?;
     Ok((path, folder))
 }

@@ -6,7 +6,7 @@ use anyhow::Result;
 use wayhome::episode::open_loop::{Commands, drive};
 use wayhome::episode::{Setup, Start};
 use wayhome::random::Seed;
-use wayhome::record::drive::{DriveFiles, FILES};
+use wayhome::record::drive::DriveFiles;
 use wayhome::report::text;
 use wayhome::world::World;
 
@@ -49,7 +49,7 @@ pub fn run(args: &DriveArgs, context: &Context) -> Result<Verdict> {
         Some(start) => Setup { start: start.clone(), ..Setup::default() }.start_pose(&world, Seed(args.seed))?,
     };
     let parts = ["drive", &world.spec.name, &args.seed.to_string()];
-    let (out, folder) = open_folder(args.out.as_deref(), &parts, "drive", FILES)?;
+    let (out, folder) = open_folder(args.out.as_deref(), &parts, "drive")?;
     let bar = context.progress(None)?;
     let mut files = DriveFiles::begin(folder, &world)?;
     let summary = drive(&world, start, Seed(args.seed), &commands, &mut |step, collisions| {

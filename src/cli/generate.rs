@@ -17,9 +17,6 @@ use wayhome::world::generate::{Generated, HEAD, Kind, Knob, Knobs, OUTLINE, Outl
 use super::context::{Context, Verdict, folder_or, print, write_own};
 use super::values::choice;
 
-/// Names of the files in a folder of generated worlds.
-const FILES: &[&str] =
-    &["lab-#.toml", "office-#.toml", "flat-#.toml", "corridor-#.toml", "hall-#.toml", "warehouse-#.toml", "bare-#.toml"];
 /// Worlds that are made before they are written and the user is asked whether to go on.
 const BATCH: u64 = 256;
 
@@ -90,7 +87,7 @@ pub fn run(args: &GenerateArgs, context: &Context) -> Result<Verdict> {
         (None, None) => Some(folder_or(None, &["generate", kind, &first])),
         _ => None,
     };
-    let mut open = folder.as_ref().map(|path| OutputFolder::open(path, "world generate", FILES)).transpose()?;
+    let mut open = folder.as_ref().map(|path| OutputFolder::open(path, "world generate")).transpose()?;
     let mut sheet = args.sheet.as_ref().map(|_| SheetMaker::new(args.renderer)).transpose()?;
     let bar = context.work(args.count)?;
     let mut worlds = Vec::new();

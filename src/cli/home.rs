@@ -142,7 +142,7 @@ fn single(args: &HomeArgs, context: &Context, world: &World, setup: &Setup, seed
 
 fn batch(args: &HomeArgs, context: &Context, world: &World, setup: &Setup, seeds: &RangeInclusive<u64>) -> Result<Verdict> {
     let parts = ["home", &world.spec.name, &range(seeds)];
-    let (out, folder) = open_folder(args.out.as_deref(), &parts, "home --seeds", seeds_report::FILES)?;
+    let (out, folder) = open_folder(args.out.as_deref(), &parts, "home --seeds")?;
     let bar = context.progress(Some(count(seeds)))?;
     let home = AtomicUsize::new(0);
     let watch = |summary: &Summary| {

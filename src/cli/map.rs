@@ -12,9 +12,6 @@ use wayhome::world::map::{self, COARSEST_M, FINEST_M, HEAD, ImportSettings, Map,
 use super::context::{Context, Verdict, open_folder, print, write_own};
 use super::values::{not_negative, pose, positive};
 
-/// Names of the files of an exported map.
-const FILES: &[&str] = &["map.yaml", "map.pgm", "world.sdf"];
-
 /// Arguments of `world import`.
 #[derive(Debug, clap::Args)]
 pub struct ImportArgs {
@@ -144,7 +141,7 @@ fn text(report: &Report, out: &str) -> String {
 pub fn export(args: &ExportArgs, context: &Context) -> Result<Verdict> {
     let world = World::open(&args.world)?;
     let map = map::export(&world, args.resolution_m)?;
-    let (path, mut folder) = open_folder(args.out.as_deref(), &["map", &world.spec.name], "world export", FILES)?;
+    let (path, mut folder) = open_folder(args.out.as_deref(), &["map", &world.spec.name], "world export")?;
     let home = &world.spec.home;
     let comments = [
         format!("World `{}`, drawn by `wayhome world export`; its frame is the map's.", world.spec.name),

@@ -11,9 +11,6 @@ use wayhome::world::World;
 use super::context::{Context, Verdict, open_folder};
 use super::values::{number, positive};
 
-/// Names of all files.
-const FILES: &[&str] = &["observability.svg", "observability.csv"];
-
 /// Arguments of `observability`.
 #[derive(Debug, clap::Args)]
 pub struct ObservabilityArgs {
@@ -47,7 +44,7 @@ pub fn run(args: &ObservabilityArgs, context: &Context) -> Result<Verdict> {
     };
     let map = map(&world, facing, args.spacing_m)?;
     let parts = ["observability", &world.spec.name];
-    let (out, mut folder) = open_folder(args.out.as_deref(), &parts, "observability", FILES)?;
+    let (out, mut folder) = open_folder(args.out.as_deref(), &parts, "observability")?;
     folder.write("observability.svg", map_svg(&world, &map, &words).as_bytes())?;
     folder.write("observability.csv", map_csv(&map).as_bytes())?;
     folder.finish()?;

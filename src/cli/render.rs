@@ -181,8 +181,7 @@ fn check_memory(projection: &Projection, pictures: usize) -> Result<(), Error> {
 fn still(args: &RenderArgs, context: &Context, world: &World, pose: Pose) -> Result<()> {
     check_place(world, &pose)?;
     let mut take = Take::new(args, world, projection(args, world), 1)?;
-    let files = &["rgb.png", "range.png", "instance.png", "meta.json"];
-    let (out, mut folder) = open_folder(args.out.as_deref(), &["render", &world.spec.name], "render", files)?;
+    let (out, mut folder) = open_folder(args.out.as_deref(), &["render", &world.spec.name], "render")?;
     let mut panorama = Panorama::empty();
     take.shoot(&mut Camera::new(take.optics), world, pose, args.seed, &mut panorama)?;
     for (name, bytes) in encode(&panorama, "")? {
@@ -200,9 +199,8 @@ fn film(args: &RenderArgs, context: &Context, world: &World, path: &Path) -> Res
     let frames = checked(world, path)?;
     let projection = projection(args, world);
     let mut take = Take::new(args, world, projection, render::most_in_memory(projection).min(frames.len()))?;
-    let files = &["rgb-#.png", "range-#.png", "instance-#.png", "meta.json"];
     let parts = ["render", &world.spec.name, "trajectory"];
-    let (out, mut folder) = open_folder(args.out.as_deref(), &parts, "render --trajectory", files)?;
+    let (out, mut folder) = open_folder(args.out.as_deref(), &parts, "render --trajectory")?;
     let bodies = world.body_poses();
     let views: Vec<_> = frames.iter().map(|f| View { projection, robot: f.robot, bodies: &bodies }).collect();
     let camera = Camera::new(take.optics);
@@ -252,7 +250,7 @@ fn sheet(args: &RenderArgs, context: &Context, world: &World, pose: Option<Pose>
     let (width, height) = args.size.unwrap_or(SIZE);
     let mut take = Take::new(args, world, world.projection_of_size(width, height), poses.len())?;
     let parts = ["render", &world.spec.name, "sheet"];
-    let (out, mut folder) = open_folder(args.out.as_deref(), &parts, "render --sheet", &["sheet.png"])?;
+    let (out, mut folder) = open_folder(args.out.as_deref(), &parts, "render --sheet")?;
     let (mut sheet, mut panorama, mut camera) = (Sheet::new(), Panorama::empty(), Camera::new(take.optics));
     for robot in &poses {
         take.shoot(&mut camera, world, *robot, args.seed, &mut panorama)?;

@@ -54,7 +54,7 @@ pub fn run(args: &ReproduceArgs, context: &Context) -> Result<Verdict> {
     let is_wanted = |t: &Target| args.targets.is_empty() || args.targets.contains(&Some(*t)) || args.targets.contains(&None);
     let wanted: Vec<Target> = Target::VARIANTS.iter().copied().filter(is_wanted).collect();
     check_dataset(args, &wanted)?;
-    let folder = OutputFolder::open(&args.out, "reproduce", page::files())?;
+    let folder = OutputFolder::open(&args.out, "reproduce")?;
     let evidence = Evidence::new(args.dataset.as_deref())?;
     let bar = context.progress(Some(wanted.len() as u64))?;
     let mut sections = Vec::new();

@@ -45,7 +45,7 @@ pub fn run(args: &RobustnessArgs, context: &Context) -> Result<Verdict> {
         return Err(Error::Invalid { what: "plant for --axis friction".into(), found, allowed }.into());
     }
     let parts = ["robustness", &World::open(&args.world)?.spec.name, &range(&args.seeds)];
-    let (out, folder) = open_folder(args.out.as_deref(), &parts, "robustness", report::FILES)?;
+    let (out, folder) = open_folder(args.out.as_deref(), &parts, "robustness")?;
     let bar = context.progress(Some(study.episodes()))?;
     let study = run_study(&study, &context.pool(), &|row| bar.done(study.place_in_words(row)))?;
     drop(bar);

@@ -112,14 +112,14 @@ fn print<T: Serialize>(context: &Context, found: &T, out: &Path, text: impl FnOn
 }
 
 pub fn physics(args: &PhysicsArgs, context: &Context) -> Result<Verdict> {
-    let folder = OutputFolder::open_renamed(&args.out, "verify physics", "physics-report", physics::page::FILES)?;
+    let folder = OutputFolder::open_shared(&args.out, "verify physics", "physics-report", physics::page::OUTSIDE)?;
     let found = physics::measure()?;
     physics::page::write(folder, &found)?;
     print(context, &found, &args.out, physics::page::text)
 }
 
 pub fn render(args: &RenderArgs, context: &Context) -> Result<Verdict> {
-    let folder = OutputFolder::open_renamed(&args.out, "verify render", "render-report", render::page::FILES)?;
+    let folder = OutputFolder::open_shared(&args.out, "verify render", "render-report", &[])?;
     let sheets = render::page::sheets()?;
     let found = render_speeds(args.seconds, context)?;
     render::page::write(folder, &found, &sheets)?;
@@ -147,7 +147,7 @@ fn render_speeds(seconds: f64, context: &Context) -> Result<render::RenderSpeeds
 
 pub fn dataset(args: &DatasetArgs, context: &Context) -> Result<Verdict> {
     let world = World::open(&args.world)?;
-    let open = |out| OutputFolder::open_renamed(out, "verify dataset", "dataset bench", dataset::page::FILES);
+    let open = |out| OutputFolder::open_shared(out, "verify dataset", "dataset bench", &[]);
     let folder = args.out.as_deref().map(open).transpose()?;
     let bar = context.progress(None)?;
     let found = dataset::measure(&world, args.frames as usize, &std::env::temp_dir(), &|what| bar.at(what.to_owned()))?;
@@ -173,7 +173,7 @@ pub fn vision(args: &VisionArgs, context: &Context) -> Result<Verdict> {
         factors: factors.filter(|factor| args.axis.is_empty() || args.axis.contains(factor)).collect(),
         seed: args.seed,
     };
-    let folder = OutputFolder::open_renamed(&args.out, "verify vision", "vision-report", vision::page::FILES)?;
+    let folder = OutputFolder::open_shared(&args.out, "verify vision", "vision-report", vision::page::OUTSIDE)?;
     if let Some(pairs) = &args.pairs {
         claim(pairs)?;
     }

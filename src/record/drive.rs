@@ -9,9 +9,6 @@ use crate::storage::csv::{self, Columns, number};
 use crate::storage::{FolderFile, OutputFolder, json};
 use crate::world::World;
 
-/// Names of all files of a drive.
-pub const FILES: &[&str] = &["summary.json", "drive.csv", "collisions.csv", "path.svg"];
-
 /// Columns of `drive.csv`. Slip, forces and loads are means over the interval that ends at the row's time, in the robot's frame;
 /// everything else is as of that time.
 const COLUMNS: &Columns<DriveStep> = &[
@@ -68,7 +65,7 @@ pub struct DriveFiles<'a> {
 }
 
 impl<'a> DriveFiles<'a> {
-    /// Begins the files in `folder`, which was opened for [`FILES`].
+    /// Begins the files in `folder`.
     ///
     /// # Errors
     /// When a file cannot be created.

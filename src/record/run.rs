@@ -12,19 +12,6 @@ use crate::storage::csv::{self, Columns, number};
 use crate::storage::{OutputFolder, json};
 use crate::world::World;
 
-/// Names of all files of a run; those of panoramas are there when the sensor has a camera, that of estimates when the method has any.
-const FILES: &[&str] = &[
-    "summary.json",
-    "trajectory.csv",
-    "trajectory.tum",
-    "odometry.tum",
-    "estimate.tum",
-    "path.svg",
-    "home.png",
-    "panorama_start.png",
-    "panorama_end.png",
-];
-
 /// Columns of `trajectory.csv`, of a step and of what its method believes to be about.
 const COLUMNS: &Columns<(Step, Option<Belief>)> = &[
     ("t_s", |(s, _)| number(s.time_s)),
@@ -61,7 +48,7 @@ impl<'a> RunFiles<'a> {
     /// # Errors
     /// As [`OutputFolder::open`].
     pub fn open(path: &Path, verb: &str, world: &'a World) -> Result<Self> {
-        Ok(Self { world, folder: Some(OutputFolder::open(path, verb, FILES)?) })
+        Ok(Self { world, folder: Some(OutputFolder::open(path, verb)?) })
     }
 }
 

@@ -16,9 +16,6 @@ use crate::storage::csv::{Columns, csv, number as cell};
 use crate::study::compare::{Comparison, Contender, Standing};
 use crate::world::World;
 
-/// Names of all files of a comparison; with the chart, each contender's map is an SVG.
-pub const FILES: &[&str] = &["README.md", "compare.csv", "*.svg"];
-
 /// Writes all files of a comparison that `command` has made.
 ///
 /// # Errors

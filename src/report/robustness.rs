@@ -12,9 +12,6 @@ use crate::storage::OutputFolder;
 use crate::storage::csv::{Columns, csv, number as cell};
 use crate::study::robustness::{Axis, Cell, Robustness};
 
-/// Names of all files of a study.
-pub const FILES: &[&str] = &["README.md", "robustness.csv", "robustness.svg"];
-
 /// Writes all files of a study that `command` has made.
 ///
 /// # Errors

@@ -6,9 +6,6 @@ use crate::storage::{OutputFolder, json};
 use crate::study::row::{Ending, RunRow};
 use crate::study::seeds::SeedsSummary;
 
-/// Names of all files of a batch; the last is there when a method broke.
-pub const FILES: &[&str] = &["summary.json", "seeds.csv", "failures.csv"];
-
 /// Columns of `seeds.csv`.
 const COLUMNS: &Columns<RunRow> = &[
     ("seed", |r| r.seed.to_string()),

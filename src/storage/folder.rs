@@ -8,44 +8,44 @@ use std::path::{Path, PathBuf};
 use crate::error::{Error, Result};
 use crate::storage::{self, PARTIAL, io_error, write_atomically};
 
-/// File that marks a folder as ours: the verb that writes it, and below that, a line each, files that are not among the names that
-/// the verb always writes.
+/// File that marks a folder as ours: the verb that writes it, and below that, a line each, the names of what it has written, this file's
+/// among them. A `#` in a name stands for any number: `rgb-#.png`.
 pub(crate) const MARKER: &str = ".wayhome";
 
 /// A folder of results that one verb of the program writes.
 ///
 /// A folder that the same verb wrote before may be written again; one that holds anything else is refused. Every file appears
-/// whole or not at all: it is written under another name and then renamed.
+/// whole or not at all: it is written under another name and then renamed. It is known as ours before it is there.
 #[derive(Debug)]
 pub struct OutputFolder {
     path: PathBuf,
     verb: String,
-    names: &'static [&'static str],
-    /// Files beyond those names.
-    others: BTreeSet<String>,
+    /// Names of what is ours, as [`numberless`] makes them.
+    ours: BTreeSet<String>,
     written: BTreeSet<String>,
 }
 
 impl OutputFolder {
-    /// Opens or creates the folder for `verb`, which writes files of the given names, and others that the marker then lists. A `#` in a
-    /// name stands for any number: `frame-#.png`; a `*` before it for any beginning: `*.svg`.
+    /// Opens or creates the folder for `verb`.
     ///
     /// # Errors
     /// When the folder cannot be created or read, or holds what `verb` has not written.
-    pub fn open(path: &Path, verb: &str, names: &'static [&'static str]) -> Result<Self> {
-        Self::open_renamed(path, verb, verb, names)
+    pub fn open(path: &Path, verb: &str) -> Result<Self> {
+        Self::open_shared(path, verb, verb, &[])
     }
 
-    /// As [`Self::open`] for a verb that was called `former` once: what it wrote under that name may be written again too.
+    /// As [`Self::open`] for a verb that was called `former` once, whose folder may be written again too, and that reads files of the
+    /// names `guests`, which others put there.
     ///
     /// # Errors
     /// As [`Self::open`].
-    pub fn open_renamed(path: &Path, verb: &str, former: &str, names: &'static [&'static str]) -> Result<Self> {
+    pub fn open_shared(path: &Path, verb: &str, former: &str, guests: &[&str]) -> Result<Self> {
         fs::create_dir_all(path).map_err(io_error("create folder", path))?;
         let held = files(path)?;
         let marker = path.join(MARKER);
         let refused = |found: String| Error::OutputTaken { path: path.to_owned(), found };
-        let mut others = BTreeSet::new();
+        let own = BTreeSet::from([MARKER.to_owned()]);
+        let mut ours = own.clone();
         if !held.is_empty() {
             match fs::read_to_string(&marker) {
                 Ok(text) => {
@@ -54,14 +54,17 @@ impl OutputFolder {
                     if ![verb, former].contains(&owner) {
                         return Err(refused(format!("the results of `wayhome {owner}`")));
                     }
-                    others.extend(lines.map(str::to_owned));
+                    ours = lines.map(str::to_owned).collect();
                 }
                 Err(e) if e.kind() == io::ErrorKind::NotFound => return Err(refused(format!("`{}`", held[0]))),
                 Err(source) => return Err(Error::Io { action: "read", path: marker, source }),
             }
         }
-        let folder = Self { path: path.to_owned(), verb: verb.to_owned(), names, others, written: BTreeSet::new() };
-        if let Some(foreign) = held.iter().find(|h| *h != MARKER && !h.ends_with(PARTIAL) && !folder.is_ours(h)) {
+        // The marker of an older version lists nothing: what it has written is not told from the rest, which stays until it is written.
+        let lists = ours.contains(MARKER);
+        ours.extend(own.iter().cloned().chain(guests.iter().map(|&name| name.to_owned())));
+        let folder = Self { path: path.to_owned(), verb: verb.to_owned(), ours, written: own };
+        if let Some(foreign) = held.iter().find(|h| lists && !h.ends_with(PARTIAL) && !folder.is_ours(h)) {
             return Err(refused(format!("`{foreign}`")));
         }
         for partial in held.iter().filter(|h| h.ends_with(PARTIAL)) {
@@ -73,21 +76,17 @@ impl OutputFolder {
 
     /// Writes down whose the folder is.
     fn mark(&self) -> Result<()> {
-        let lines: String = std::iter::once(&self.verb).chain(&self.others).map(|line| format!("{line}\n")).collect();
+        let lines: String = std::iter::once(&self.verb).chain(&self.ours).map(|line| format!("{line}\n")).collect();
         write_atomically(&self.path.join(MARKER), lines.as_bytes())
     }
 
     fn is_ours(&self, name: &str) -> bool {
-        is_announced(self.names, name) || self.others.contains(name)
+        self.ours.contains(&numberless(name))
     }
 
     /// Makes sure that a file of this name is known as ours before it is there.
     fn own(&mut self, name: &str) -> Result<()> {
-        if self.is_ours(name) {
-            return Ok(());
-        }
-        self.others.insert(name.to_owned());
-        self.mark()
+        if self.ours.insert(numberless(name)) { self.mark() } else { Ok(()) }
     }
 
     /// Where it is.
@@ -133,9 +132,8 @@ impl OutputFolder {
     pub fn finish(mut self) -> Result<()> {
         let stale = |name: &String| self.is_ours(name) && !self.written.contains(name);
         files(&self.path)?.iter().filter(|name| stale(name)).try_for_each(|name| remove(&self.path.join(name)))?;
-        let known = self.others.len();
-        self.others.retain(|name| self.written.contains(name));
-        if self.others.len() < known { self.mark() } else { Ok(()) }
+        let ours = self.written.iter().map(|name| numberless(name)).collect();
+        if std::mem::replace(&mut self.ours, ours) == self.ours { Ok(()) } else { self.mark() }
     }
 }
 
@@ -149,21 +147,12 @@ pub(crate) fn files(path: &Path) -> Result<Vec<String>> {
     Ok(names)
 }
 
-/// Whether a file's name is one of `names`.
-fn is_announced(names: &[&str], file: &str) -> bool {
-    names.iter().any(|name| match name.strip_prefix('*') {
-        Some(ending) => file.ends_with(ending),
-        None => is_numbered(name, file),
-    })
-}
-
-fn is_numbered(name: &str, file: &str) -> bool {
-    match name.split_once('#') {
-        None => name == file,
-        Some((before, after)) => {
-            let number = file.strip_prefix(before).and_then(|rest| rest.strip_suffix(after));
-            number.is_some_and(|n| !n.is_empty() && n.bytes().all(|b| b.is_ascii_digit()))
-        }
+/// The name of a file with a `#` for the number after its last dash, so that a series has one name.
+fn numberless(name: &str) -> String {
+    let is_number = |text: &str| !text.is_empty() && text.bytes().all(|b| b.is_ascii_digit());
+    match name.rsplit_once('-').and_then(|(series, rest)| Some((series, rest.split_once('.')?))) {
+        Some((series, (number, ending))) if is_number(number) => format!("{series}-#.{ending}"),
+        _ => name.to_owned(),
     }
 }
 
@@ -198,45 +187,47 @@ pub(crate) fn remove(path: &Path) -> Result<()> {
 mod tests {
     use super::*;
 
-    const NAMES: &[&str] = &["a.txt", "b.txt"];
-
     #[test]
     fn a_verb_may_write_its_folder_again() {
         let base = tempfile::tempdir().unwrap();
         let path = base.path().join("new/folder");
-        let mut first = OutputFolder::open(&path, "home", NAMES).unwrap();
+        let mut first = OutputFolder::open(&path, "home").unwrap();
         first.write("a.txt", b"1").unwrap();
         first.write("b.txt", b"1").unwrap();
         first.finish().unwrap();
         fs::write(path.join("a.txt.wayhome-partial"), "cut off").unwrap();
-        let mut second = OutputFolder::open(&path, "home", NAMES).unwrap();
+        let mut second = OutputFolder::open(&path, "home").unwrap();
         second.write("a.txt", b"2").unwrap();
         second.finish().unwrap();
         assert_eq!(fs::read(path.join("a.txt")).unwrap(), b"2");
-        let mut held: Vec<_> = fs::read_dir(&path).unwrap().map(|e| e.unwrap().file_name()).collect();
-        held.sort();
-        assert_eq!(held, [".wayhome", "a.txt"], "what is stale is gone");
+        assert_eq!(files(&path).unwrap(), [MARKER, "a.txt"], "what is stale is gone");
+        assert_eq!(fs::read_to_string(path.join(MARKER)).unwrap(), "home\n.wayhome\na.txt\n");
+        fs::write(path.join("b.txt"), "mine").unwrap();
+        assert!(OutputFolder::open(&path, "home").unwrap_err().to_string().contains("b.txt"), "it is no longer ours");
     }
 
-    /// What is written under a name that nobody announced is ours as well, the next time and when it is stale.
+    /// What an older version wrote may be written again, but what of it is stale is not known.
     #[test]
-    fn a_file_needs_no_announcement() {
+    fn a_marker_without_a_list_lets_all_stay() {
         let base = tempfile::tempdir().unwrap();
-        let open = || OutputFolder::open(base.path(), "home", NAMES);
-        open().unwrap().write("extra.csv", b"1").unwrap();
-        let mut second = open().unwrap();
-        second.write("a.txt", b"2").unwrap();
-        second.finish().unwrap();
-        assert_eq!(files(base.path()).unwrap(), [".wayhome", "a.txt"]);
-        assert_eq!(fs::read_to_string(base.path().join(MARKER)).unwrap(), "home\n");
-        fs::write(base.path().join("extra.csv"), "mine").unwrap();
-        assert!(open().unwrap_err().to_string().contains("extra.csv"), "it is no longer ours");
+        for (name, text) in [(MARKER, "home-run\n"), ("a.txt", "1"), ("b.txt", "1"), ("guest.csv", "1")] {
+            fs::write(base.path().join(name), text).unwrap();
+        }
+        let open = || OutputFolder::open_shared(base.path(), "home", "home-run", &["guest.csv"]);
+        let mut folder = open().unwrap();
+        folder.write("a.txt", b"2").unwrap();
+        folder.write("guest.csv", b"1").unwrap();
+        folder.finish().unwrap();
+        assert_eq!(files(base.path()).unwrap(), [MARKER, "a.txt", "b.txt", "guest.csv"]);
+        assert!(open().unwrap_err().to_string().contains("b.txt"));
+        fs::remove_file(base.path().join("b.txt")).unwrap();
+        open().unwrap();
     }
 
     #[test]
     fn a_growing_file_appears_whole_or_not_at_all() {
         let base = tempfile::tempdir().unwrap();
-        let mut folder = OutputFolder::open(base.path(), "home", NAMES).unwrap();
+        let mut folder = OutputFolder::open(base.path(), "home").unwrap();
         let held = || fs::read_dir(base.path()).unwrap().count();
         let mut file = folder.begin("a.txt").unwrap();
         file.append("1").unwrap();
@@ -255,26 +246,26 @@ mod tests {
     fn what_others_wrote_stays() {
         let base = tempfile::tempdir().unwrap();
         fs::write(base.path().join("a.txt"), "mine").unwrap();
-        let error = OutputFolder::open(base.path(), "home", NAMES).unwrap_err().to_string();
+        let error = OutputFolder::open(base.path(), "home").unwrap_err().to_string();
         assert!(error.contains("`a.txt`"), "{error}");
         assert_eq!(fs::read(base.path().join("a.txt")).unwrap(), b"mine");
 
         let numbered = base.path().join("numbered");
-        let mut first = OutputFolder::open(&numbered, "home", &["frame-#.png"]).unwrap();
+        let mut first = OutputFolder::open(&numbered, "home").unwrap();
         first.write("frame-000001.png", b"1").unwrap();
         first.write("frame-000002.png", b"2").unwrap();
         first.finish().unwrap();
-        let mut second = OutputFolder::open(&numbered, "home", &["frame-#.png"]).unwrap();
+        let mut second = OutputFolder::open(&numbered, "home").unwrap();
         second.write("frame-000001.png", b"1").unwrap();
         second.finish().unwrap();
         assert!(!numbered.join("frame-000002.png").exists());
         fs::write(numbered.join("frame-x.png"), "mine").unwrap();
-        assert!(OutputFolder::open(&numbered, "home", &["frame-#.png"]).is_err());
+        assert!(OutputFolder::open(&numbered, "home").is_err());
 
         let ours = base.path().join("ours");
-        OutputFolder::open(&ours, "home", NAMES).unwrap().finish().unwrap();
-        assert!(OutputFolder::open(&ours, "render", NAMES).unwrap_err().to_string().contains("wayhome home"));
+        OutputFolder::open(&ours, "home").unwrap().finish().unwrap();
+        assert!(OutputFolder::open(&ours, "render").unwrap_err().to_string().contains("wayhome home"));
         fs::write(ours.join("notes.md"), "mine").unwrap();
-        assert!(OutputFolder::open(&ours, "home", NAMES).unwrap_err().to_string().contains("notes.md"));
+        assert!(OutputFolder::open(&ours, "home").unwrap_err().to_string().contains("notes.md"));
     }
 }

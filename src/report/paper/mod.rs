@@ -11,7 +11,6 @@ mod tables;
 
 use std::fs;
 use std::io;
-use std::sync::LazyLock;
 
 use strum::{EnumMessage, IntoStaticStr, VariantArray};
 
@@ -99,15 +98,6 @@ pub fn section(target: Target, evidence: &Evidence) -> Result<Section> {
         Target::Observability => observability::observability(evidence),
         Target::Audit => audit::audit(evidence),
     }
-}
-
-/// Names of all files of the page.
-pub fn files() -> &'static [&'static str] {
-    static FILES: LazyLock<Vec<&'static str>> = LazyLock::new(|| {
-        let figures = Target::VARIANTS.iter().flat_map(|target| target.figures()).copied();
-        figures.chain(["README.md"]).collect()
-    });
-    &FILES
 }
 
 /// Writes sections with their drawings; those of the page that are not among them stay as they are, unless all are given.

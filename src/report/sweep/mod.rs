@@ -26,7 +26,7 @@ pub fn write(folder: &StudyFolder, rows: &[Row], (exhibits, withheld): (&[Exhibi
     let study = folder.study();
     let sums = Sums::new(study, rows);
     let figures = sums.figures();
-    let mut report = OutputFolder::open(out, "sweep report", &["index.html", "cells.csv", "pairs.csv", "README.md", "*.svg"])?;
+    let mut report = OutputFolder::open(out, "sweep report")?;
     let page = Page {
         sums: &sums,
         figures: &figures,

@@ -7,9 +7,6 @@ use crate::draw::markdown::table;
 use crate::error::Result;
 use crate::storage::{OutputFolder, json};
 
-/// Names of all files of the page.
-pub const FILES: &[&str] = &["README.md", "speed.json"];
-
 /// Writes the page.
 ///
 /// # Errors

@@ -7,32 +7,12 @@ use crate::error::Result;
 use crate::storage::OutputFolder;
 use crate::verify::outside;
 
-/// Names of all files of the page. `OUTSIDE` comes from outside and is kept as it is.
-pub const FILES: &[&str] = &[
-    "README.md",
-    "sideways-stop.svg",
-    "traction-limit.svg",
-    "launch.svg",
-    "yaw-braking.svg",
-    "rolling-resistance.svg",
-    "load-transfer.svg",
-    "circle-grip.svg",
-    "worn-tyre.svg",
-    "carton.svg",
-    "gyro.svg",
-    "energy.svg",
-    "convergence.svg",
-    "slip-map.svg",
-    OUTSIDE,
-    "mujoco.svg",
-    SPEED,
-];
-
 /// Trajectories of the same drives in another engine.
-const OUTSIDE: &str = "mujoco.csv";
-
+const DRIVES: &str = "mujoco.csv";
 /// What the benchmark measured.
 const SPEED: &str = "speed.csv";
+/// What others put into the folder.
+pub const OUTSIDE: &[&str] = &[DRIVES, SPEED];
 
 /// Writes the page and its drawings. What another engine made of the same drives and what the benchmark measured is shown if it
 /// lies in the folder.
@@ -40,7 +20,7 @@ const SPEED: &str = "speed.csv";
 /// # Errors
 /// When a file cannot be written, or a table from outside is not what its script writes.
 pub fn write(mut folder: OutputFolder, found: &Validation) -> Result<()> {
-    let drives = outside::keep(&mut folder, OUTSIDE, "tests/outside/mujoco_planar.py")?.map(drives);
+    let drives = outside::keep(&mut folder, DRIVES, "tests/outside/mujoco_planar.py")?.map(drives);
     let speeds = outside::keep(&mut folder, SPEED, "tests/outside/physics_speed.py")?;
     for form in &found.closed_forms {
         folder.write(&format!("{}.svg", form.name), closed_form_svg(form).as_bytes())?;

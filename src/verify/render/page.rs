@@ -14,22 +14,6 @@ use crate::render::{Camera, CpuRenderer, RendererInfo, Scene, View};
 use crate::storage::{OutputFolder, json};
 use crate::world::{CameraPreset, LightPreset, World};
 
-/// Names of all files of the page.
-pub const FILES: &[&str] = &[
-    "README.md",
-    "speed.json",
-    "lab.png",
-    "slippery.png",
-    "crowd.png",
-    "paper-ideal.png",
-    "paper-grid.png",
-    "proving-ground.png",
-    "vardy-hall.png",
-    "gallery.png",
-    "light.png",
-    "camera.png",
-];
-
 /// Size of the pictures on the sheets.
 const SIZE_PX: (u32, u32) = (560, 70);
 /// Poses on the sheet of a world.

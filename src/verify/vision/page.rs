@@ -14,22 +14,8 @@ use crate::error::Result;
 use crate::storage::OutputFolder;
 use crate::storage::csv::{Columns, csv, number};
 
-/// Names of all files of the page. The table of OpenCV comes from outside and is kept as it is.
-pub const FILES: &[&str] = &[
-    "README.md",
-    "vision.csv",
-    "matches.svg",
-    "precision.svg",
-    "repeatability.svg",
-    "errors.svg",
-    "conditions-rotation.svg",
-    "conditions-gain.svg",
-    "conditions-gamma.svg",
-    "conditions-noise.svg",
-    "conditions-occlusion.svg",
-    opencv::FILE,
-    "opencv.svg",
-];
+/// What others put into the folder.
+pub const OUTSIDE: &[&str] = &[opencv::FILE];
 
 /// Writes the page that `command` has made. What OpenCV makes of the same pairs is shown if its table lies in the folder.
 ///
