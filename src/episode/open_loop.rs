@@ -3,7 +3,7 @@
 //! [`Commands`] is the table, checked as a whole before anything moves. [`drive`] runs it on a [`RapierPlant`](crate::physics::RapierPlant) and hands on truth,
 //! odometry, wheels and floor contacts side by side, a [`DriveStep`] at a time; [`DriveSummary`] is that in numbers.
 
-use std::ops::ControlFlow;
+use std::ops::{ControlFlow, RangeInclusive};
 use std::path::Path;
 
 use serde::Serialize;
@@ -18,6 +18,7 @@ use crate::physics::{Collision, Plant, WheelState};
 use crate::random::Seed;
 use crate::sensor::Blind;
 use crate::storage::{io_error, sha256};
+use crate::table::Rows;
 use crate::world::World;
 
 /// Columns of a command table, in any order.
@@ -52,62 +53,32 @@ impl Commands {
     /// Reads a table from CSV text with the columns `t_s,v_m_s,omega_rad_s`, in any order. `source` names it in messages.
     ///
     /// # Errors
-    /// When a column is missing or unknown, a cell is empty or no finite number, a line is blank in between, the times do not
-    /// begin at 0 or do not grow by at least a millisecond, or there are fewer than two rows. The message names line and field.
+    /// When a column is missing or unknown, a cell is empty or no finite number, the times do not begin at 0 or do not grow by at least
+    /// a millisecond, or there are fewer than two rows. The message names line and field.
     pub fn parse(text: &str, source: &Path) -> Result<Self> {
-        Self::parse_rows(text)
-            .map(|rows| Self { rows, sha256: sha256(text.as_bytes()) })
-            .map_err(|message| Error::Parse { path: source.to_owned(), message })
-    }
-
-    fn parse_rows(text: &str) -> std::result::Result<Vec<(f64, Twist)>, String> {
-        let text = text.strip_prefix('\u{feff}').unwrap_or(text).trim_end();
-        let mut lines = text.lines().zip(1..);
-        let (header, _) = lines.next().unwrap_or(("", 1));
-        let names: Vec<&str> = header.split(',').map(str::trim).collect();
-        let wanted = COLUMNS.join(",");
-        if let Some(missing) = COLUMNS.iter().find(|column| !names.contains(column)) {
-            return Err(format!("line 1: found no column `{missing}`, expected the columns {wanted}"));
-        }
-        if let Some(k) = (0..names.len()).find(|&k| !COLUMNS.contains(&names[k]) || names[..k].contains(&names[k])) {
-            return Err(format!("line 1: found `{}` as column {}, expected the columns {wanted}, each once", names[k], k + 1));
-        }
+        let table = Rows::parse(text.as_bytes(), source, "command")?;
+        let [time, v, omega] = table.exactly(COLUMNS)?;
         let mut rows: Vec<(f64, Twist)> = Vec::new();
-        for (line, number) in lines {
-            let fault = |field: &str, found: &str, allowed: &str| {
-                Err(format!("line {number}, {field}: found {found}, allowed is {allowed}"))
+        for row in table.rows() {
+            let within = |column, expected: &str, range: RangeInclusive<f64>| {
+                row.value(column, expected, |cell| cell.parse().ok().filter(|number| range.contains(number)))
             };
-            let cells: Vec<&str> = line.split(',').map(str::trim).collect();
-            if cells.len() != names.len() {
-                let found = if line.trim().is_empty() { "a blank line".to_owned() } else { format!("{} cells", cells.len()) };
-                return fault("row", &found, "3 cells in every row up to the last");
-            }
-            let mut values = [0.0; 3];
-            for (name, cell) in names.iter().zip(&cells) {
-                let value = cell.parse::<f64>().ok().filter(|value| value.is_finite());
-                let (Some(value), Some(k)) = (value, COLUMNS.iter().position(|column| column == name)) else {
-                    let found = if cell.is_empty() { "an empty cell".to_owned() } else { format!("`{cell}`") };
-                    return fault(name, &found, "a finite number");
-                };
-                if k > 0 && value.abs() > GREATEST_COMMAND {
-                    return fault(name, cell, &format!("-{GREATEST_COMMAND} to {GREATEST_COMMAND}"));
+            let time_s = match rows.last() {
+                None => within(time, "0 in the first row", 0.0..=0.0)?,
+                Some((before, _)) => {
+                    let least = before + LEAST_INTERVAL_S * (1.0 - 1e-9);
+                    let expected = format!("at least {LEAST_INTERVAL_S} more than {before}, the time of the row before");
+                    within(time, &expected, least..=f64::MAX)?
                 }
-                values[k] = value;
-            }
-            let [time_s, v, omega] = values;
-            match rows.last() {
-                None if time_s != 0.0 => return fault("t_s", &time_s.to_string(), "0 in the first row"),
-                Some((before, _)) if time_s - before < LEAST_INTERVAL_S * (1.0 - 1e-9) => {
-                    let allowed = format!("at least {LEAST_INTERVAL_S} more than {before}, the time of the row before");
-                    return fault("t_s", &time_s.to_string(), &allowed);
-                }
-                _ => rows.push((time_s, Twist { v, omega })),
-            }
+            };
+            let expected = format!("-{GREATEST_COMMAND} to {GREATEST_COMMAND}");
+            let speed = |column| within(column, &expected, -GREATEST_COMMAND..=GREATEST_COMMAND);
+            rows.push((time_s, Twist { v: speed(v)?, omega: speed(omega)? }));
         }
         if rows.len() < 2 {
-            return Err(format!("found {} rows, expected at least 2: the last one only says when the drive ends", rows.len()));
+            return Err(table.fault("found 1 row, expected at least 2: the last one only says when the drive ends"));
         }
-        Ok(rows)
+        Ok(Self { rows, sha256: sha256(text.as_bytes()) })
     }
 
     /// Time of the last row, s.
@@ -204,7 +175,7 @@ fn state(simulation: &Simulation<'_>, time_s: f64, command: Twist) -> DriveStep 
 }
 
 /// A drive in numbers. Depends on the world, the commands, the start and the seed alone.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Default, Serialize)]
 pub struct DriveSummary {
     /// How long it took, s.
     pub time_s: f64,
@@ -244,22 +215,15 @@ impl DriveSummary {
     /// A drive that has not begun.
     fn new(start: &DriveStep, world: &World, commands: &Commands, seed: Seed) -> Self {
         Self {
-            time_s: 0.0,
             start: start.truth,
             end: start.truth,
             odometry_end: start.dead_reckoned,
-            odometry_drift_m: 0.0,
-            odometry_heading_drift_rad: 0.0,
-            path_length_m: 0.0,
-            greatest_speed_m_s: 0.0,
-            greatest_slip_m_s: 0.0,
-            collisions: 0,
-            collision_list: Vec::new(),
             seed: seed.0,
             world: world.spec.name.clone(),
             world_sha256: world.sha256.clone(),
             commands_sha256: commands.sha256.clone(),
             version: crate::VERSION,
+            ..Self::default()
         }
     }
 
@@ -304,15 +268,14 @@ mod tests {
         for (rows, words) in [
             ("0,0,0\n1,NaN,0\n", ["line 3", "v_m_s", "NaN"]),
             ("0,0,0\n1,0,inf\n", ["line 3", "omega_rad_s", "inf"]),
-            ("0,0,0\n1,,0\n", ["line 3", "v_m_s", "empty cell"]),
-            ("0,0,0\n\n1,0,0\n", ["line 3", "row", "blank line"]),
-            ("0,0,0\n1,0\n", ["line 3", "row", "2 cells"]),
-            ("0,0,0\n2,0,0\n1,0,0\n", ["line 4", "t_s", "found 1"]),
-            ("0,0,0\n0,0,0\n", ["line 3", "t_s", "found 0"]),
+            ("0,0,0\n1,,0\n", ["line 3", "v_m_s", "found ``"]),
+            ("0,0,0\n1,0\n", ["line 3", "found `1,0`", "3 cells"]),
+            ("0,0,0\n2,0,0\n1,0,0\n", ["line 4", "t_s", "found `1`"]),
+            ("0,0,0\n0,0,0\n", ["line 3", "t_s", "found `0`"]),
             ("0.5,0,0\n1,0,0\n", ["line 2", "t_s", "0 in the first row"]),
             ("0,fast,0\n1,0,0\n", ["line 2", "v_m_s", "`fast`"]),
             ("0,1e9,0\n1,0,0\n", ["line 2", "v_m_s", "1000"]),
-            ("0,0,0\n", ["found 1 rows", "at least 2", "c.csv"]),
+            ("0,0,0\n", ["found 1 row", "at least 2", "c.csv"]),
         ] {
             let message = parse(&format!("{header}{rows}")).unwrap_err();
             assert!(words.iter().all(|word| message.contains(word)), "{words:?} in: {message}");

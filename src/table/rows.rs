@@ -56,6 +56,25 @@ impl Rows {
         })
     }
 
+    /// The columns of a table that has these in any order and no others, in all rows.
+    ///
+    /// # Errors
+    /// When it has others, or a row is shorter or longer.
+    pub fn exactly<const N: usize>(&self, names: [&str; N]) -> Result<[usize; N]> {
+        let mut columns = [0; N];
+        for (column, name) in columns.iter_mut().zip(names) {
+            *column = self.needed(&[name])?;
+        }
+        let header = Row { table: self, record: &self.header };
+        match [header].into_iter().chain(self.rows()).find(|row| row.record.len() != N) {
+            Some(row) => {
+                let found = row.record.iter().collect::<Vec<_>>().join(",");
+                Err(self.fault(&format!("line {}: found `{found}`, expected {N} cells: {}", row.line(), names.join(","))))
+            }
+            None => Ok(columns),
+        }
+    }
+
     /// An error about this table.
     pub fn fault(&self, message: &str) -> Error {
         Error::Parse { path: self.path.clone(), message: message.to_owned() }
