@@ -90,7 +90,7 @@ pub(super) fn polyline(corners: impl IntoIterator<Item = impl Into<[f64; 2]>>) -
 }
 
 /// Corners as SVG has them.
-pub(super) fn points(corners: impl IntoIterator<Item = impl Into<[f64; 2]>>) -> String {
+pub(crate) fn points(corners: impl IntoIterator<Item = impl Into<[f64; 2]>>) -> String {
     let corners = corners.into_iter().map(Into::into).map(|[x, y]: [f64; 2]| format!("{},{}", px(x), px(y)));
     corners.collect::<Vec<_>>().join(" ")
 }
@@ -99,7 +99,7 @@ pub(crate) fn rectangle([left, top, right, bottom]: [f64; 4]) -> Rectangle {
     Rectangle::new().set("x", px(left)).set("y", px(top)).set("width", px(right - left)).set("height", px(bottom - top))
 }
 
-pub(super) fn circle(centre: impl Into<[f64; 2]>, radius: f64) -> Circle {
+pub(crate) fn circle(centre: impl Into<[f64; 2]>, radius: f64) -> Circle {
     let [x, y] = centre.into();
     Circle::new().set("cx", px(x)).set("cy", px(y)).set("r", px(radius))
 }
@@ -117,7 +117,7 @@ pub(super) fn number(value: f64, decimals: usize) -> String {
 }
 
 /// The colour at a value, straight between those of the stops around it, which ascend; red, green and blue are 0 to 255.
-pub(super) fn blend(stops: &[(f64, [f64; 3])], value: f64) -> String {
+pub(crate) fn blend(stops: &[(f64, [f64; 3])], value: f64) -> String {
     let after = stops.iter().position(|(at, _)| *at >= value).unwrap_or(stops.len() - 1).max(1);
     let ((low, from), (high, to)) = (stops[after - 1], stops[after]);
     let t = ((value - low) / (high - low)).clamp(0.0, 1.0);

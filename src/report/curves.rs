@@ -1,9 +1,9 @@
 //! Curves over the levels of one axis, with intervals: what shares and ratios do as something gets worse.
 
 use svg::Document;
-use svg::node::element::{Circle, Group, Polyline};
+use svg::node::element::{Group, Polyline};
 
-use crate::draw::chart::{FAINT_INK, INK, SERIES, line, px, rectangle, text};
+use crate::draw::chart::{FAINT_INK, INK, SERIES, circle, line, points, px, rectangle, text};
 
 /// Width of a figure, px: that of a phone, where it is shown as it is; on a desk several stand side by side.
 pub(super) const WIDTH_PX: f64 = 360.0;
@@ -86,14 +86,13 @@ pub(super) fn curves(title: &str, (label, levels): (&str, &[String]), unit: Unit
 fn draw(curve: &Curve, colour: &str, x: &dyn Fn(usize) -> f64, y: &dyn Fn(f64) -> f64) -> Group {
     let mut group = Group::new();
     let known: Vec<(usize, [f64; 3])> = curve.points.iter().enumerate().filter_map(|(k, p)| Some((k, (*p)?))).collect();
-    let corners: Vec<String> = known.iter().map(|(k, [_, middle, _])| format!("{},{}", px(x(*k)), px(y(*middle)))).collect();
-    let joined = Polyline::new().set("points", corners.join(" ")).set("fill", "none").set("stroke", colour);
+    let corners = points(known.iter().map(|(k, [_, middle, _])| [x(*k), y(*middle)]));
+    let joined = Polyline::new().set("points", corners).set("fill", "none").set("stroke", colour);
     group = group.add(joined.set("stroke-width", 1.4).set("stroke-opacity", 0.55));
     for (k, [low, middle, high]) in known {
         let at = x(k);
         let interval = line([at, y(low)], [at, y(high)]).set("stroke", colour).set("stroke-width", 1.5);
-        let point = Circle::new().set("cx", px(at)).set("cy", px(y(middle))).set("r", 3).set("fill", colour);
-        group = group.add(interval).add(point);
+        group = group.add(interval).add(circle([at, y(middle)], 3.0).set("fill", colour));
     }
     group
 }

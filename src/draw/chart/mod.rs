@@ -20,8 +20,8 @@ mod ramp;
 
 use svg::node::element::{Circle, ClipPath, Definitions, Group};
 
-pub(crate) use crate::draw::shapes::{FAINT_INK, INK, line, px, rectangle, stroked, text};
-use crate::draw::shapes::{GRID, circle, page, polyline};
+pub(crate) use crate::draw::shapes::{FAINT_INK, INK, blend, circle, line, points, px, rectangle, stroked, text};
+use crate::draw::shapes::{GRID, page, polyline};
 pub use crate::draw::shapes::{SERIES, Stroke};
 pub use axis::Axis;
 use axis::Placed;

@@ -2,7 +2,7 @@
 
 use svg::node::element::{Group, Title};
 
-use crate::draw::chart::{FAINT_INK, INK, line, px, rectangle, text};
+use crate::draw::chart::{FAINT_INK, INK, blend, line, px, rectangle, text};
 use crate::report::curves::{WIDTH_PX, document};
 use crate::study::sweep::duels::Scale;
 
@@ -97,13 +97,14 @@ fn draw(cell: Option<&Cell>, [left, top, right, bottom]: [f64; 4], interval_px: 
 
 /// From rust (0) over sand to blue (1), which people with any colour vision tell apart, and that of a text on it.
 fn colour(share: f64) -> (String, &'static str) {
-    const STOPS: [[f64; 3]; 5] =
-        [[165.0, 58.0, 38.0], [221.0, 150.0, 105.0], [243.0, 232.0, 208.0], [128.0, 178.0, 205.0], [26.0, 98.0, 148.0]];
-    let place = share.clamp(0.0, 1.0) * (STOPS.len() - 1) as f64;
-    let before = (place as usize).min(STOPS.len() - 2);
-    let t = place - before as f64;
-    let [r, g, b] = [0, 1, 2].map(|k| (STOPS[before][k] + t * (STOPS[before + 1][k] - STOPS[before][k])).round() as u8);
-    (format!("#{r:02x}{g:02x}{b:02x}"), if (0.14..0.86).contains(&share) { INK } else { "#ffffff" })
+    const STOPS: [(f64, [f64; 3]); 5] = [
+        (0.0, [165.0, 58.0, 38.0]),
+        (0.25, [221.0, 150.0, 105.0]),
+        (0.5, [243.0, 232.0, 208.0]),
+        (0.75, [128.0, 178.0, 205.0]),
+        (1.0, [26.0, 98.0, 148.0]),
+    ];
+    (blend(&STOPS, share), if (0.14..0.86).contains(&share) { INK } else { "#ffffff" })
 }
 
 /// A strip of all colours with words at its beginning, middle and end.
