@@ -107,6 +107,9 @@ pub struct Observation<'a> {
     pub odometry: Odometry,
     /// Bearings seen now, each id at most once. May hold wrong matches.
     pub bearings: &'a [Bearing],
+    /// What the view may show instead of [`Observation::bearings`]: further sets of them, each explained by another motion from
+    /// home, likeliest first. There are some where things look alike. A method may leave them alone.
+    pub alternatives: &'a [Vec<Bearing>],
     /// Heading in the home frame as a compass tells it, rad; `None` for a robot without one.
     pub compass_rad: Option<f64>,
     /// What the bumper felt since the last observation.

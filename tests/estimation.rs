@@ -156,6 +156,7 @@ fn trial(setting: &Setting, seed: u64) -> Trial {
             time_s: time,
             odometry,
             bearings: &bearings,
+            alternatives: &[],
             compass_rad: None,
             bumper: Bumper::default(),
             panorama: None,

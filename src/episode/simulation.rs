@@ -250,6 +250,7 @@ impl<'a> Simulation<'a> {
             time_s: episode.time_s(self.task.control_period_s),
             odometry: episode.odometry,
             bearings: &episode.bearings,
+            alternatives: self.sensor.alternatives(),
             compass_rad: episode.compass_rad,
             bumper: episode.plant.bumper(),
             panorama: self.sensor.panorama().map(Panorama::picture),

@@ -181,6 +181,7 @@ mod tests {
             time_s: 0.0,
             odometry: Odometry::default(),
             bearings: &[],
+            alternatives: &[],
             compass_rad: None,
             bumper: crate::observation::Bumper::default(),
             panorama: None,

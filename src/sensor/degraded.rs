@@ -54,6 +54,9 @@ pub struct DegradedSensor<'a> {
     hidden: BTreeMap<LandmarkId, bool>,
     false_match: Stream,
     normal: Stream,
+    /// The other readings of the last view, and the noise of them.
+    alternatives: Vec<Vec<Bearing>>,
+    other_normal: Stream,
 }
 
 impl<'a> DegradedSensor<'a> {
@@ -69,7 +72,21 @@ impl<'a> DegradedSensor<'a> {
             hidden: BTreeMap::new(),
             false_match: seed.stream("false-match"),
             normal: seed.stream("noise"),
+            alternatives: Vec::new(),
+            other_normal: seed.stream("noise-alternatives"),
         }
+    }
+
+    /// Other readings of the view are of the same features: hidden with them, and as noisy. They are wrong matches anyway.
+    fn spoil_alternatives(&mut self) {
+        let mut readings = self.sensor.alternatives().to_vec();
+        for reading in &mut readings {
+            reading.retain(|b| !self.is_hidden(b.id));
+            for bearing in reading {
+                *bearing = blurred(*bearing, self.degradation.noise_sd_rad, standard_normal(&mut self.other_normal));
+            }
+        }
+        self.alternatives = readings;
     }
 
     fn is_hidden(&mut self, id: LandmarkId) -> bool {
@@ -111,6 +128,8 @@ impl Sensor for DegradedSensor<'_> {
         self.hidden_up_to = count.checked_sub(1).and_then(|last| keys.get(last)).copied().unwrap_or(-1.0);
         self.hidden.clear();
         (self.false_match, self.normal) = (self.seed.stream("false-match"), self.seed.stream("noise"));
+        self.other_normal = self.seed.stream("noise-alternatives");
+        self.alternatives.clear();
         Ok(())
     }
 
@@ -138,11 +157,16 @@ impl Sensor for DegradedSensor<'_> {
             }
             *bearing = blurred(*bearing, self.degradation.noise_sd_rad, deviations);
         }
+        self.spoil_alternatives();
         Ok(seen)
     }
 
     fn inner(&self) -> Option<&dyn Sensor> {
         Some(self.sensor.as_ref())
+    }
+
+    fn alternatives(&self) -> &[Vec<Bearing>] {
+        &self.alternatives
     }
 }
 

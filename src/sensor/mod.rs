@@ -51,6 +51,12 @@ pub trait Sensor: Send {
     /// When a renderer fails.
     fn observe(&mut self, truth: Pose, bodies: &[Pose]) -> Result<Vec<Bearing>>;
 
+    /// What the last look may show instead: further sets of bearings, each id at most once in each, likeliest first. Empty for a
+    /// sensor that does not mistake one landmark for another.
+    fn alternatives(&self) -> &[Vec<Bearing>] {
+        self.inner().map_or(&[], Sensor::alternatives)
+    }
+
     /// Heading in the home frame, rad, of a robot whose true pose in the room is `truth`; `None` without a compass.
     fn compass_rad(&mut self, _truth: Pose) -> Option<f64> {
         None

@@ -139,6 +139,10 @@ impl Sensor for RenderedSensor<'_> {
         Ok(bearings)
     }
 
+    fn alternatives(&self) -> &[Vec<Bearing>] {
+        self.extractor.as_ref().map_or(&[], Extractor::alternatives)
+    }
+
     fn home_panorama(&self) -> Option<&Panorama> {
         Some(&self.home_panorama)
     }

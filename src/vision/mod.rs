@@ -4,7 +4,8 @@
 //! panorama that follows. Features are upright blobs in scale space (`pyramid`, `detect`), described by gradient
 //! histograms (`describe`), matched by descriptor distance (`matching`) and checked against the one planar motion
 //! that must explain them all (`motion`). Once that motion is known, matches that were too ambiguous at first are
-//! taken where they fit it, which is what keeps landmarks in sight far from home. A landmark is a feature, or, by
+//! taken where they fit it, which is what keeps landmarks in sight far from home. Where things look alike, several motions explain
+//! much of the view, each its own part: all that chance would not bring are told, as readings of the view. A landmark is a feature, or, by
 //! [`ExtractorSettings::landmarks`], an object on which several features lie (`objects`).
 //!
 //! Only azimuths leave this module: elevations, scales and the motion found serve to refuse wrong matches and are not
@@ -19,6 +20,8 @@ mod motion;
 mod objects;
 mod pyramid;
 
+use std::cmp::Reverse;
+use std::collections::BTreeSet;
 use std::ops::Range;
 
 use rayon::prelude::*;
@@ -33,7 +36,7 @@ use crate::random::Seed;
 use describe::{Describer, Descriptor};
 use detect::{Criteria, Feature};
 use matching::{Candidate, Choice, Gallery, Seen, View};
-use motion::{Pair, PlanarMotion, Sight};
+use motion::{Chance, Pair, PlanarMotion, Sight};
 use objects::{Found, Objects, Place};
 use pyramid::Pyramid;
 
@@ -84,8 +87,15 @@ pub struct ExtractorSettings {
     pub guided_ratio: f32,
     /// Pairs of matches tried as the motion.
     pub draws: usize,
-    /// Fewest matches that make an observation: where fewer fit one motion, they do by chance and none is reported.
+    /// A motion is believed if wrong matches, as many as there are and as ready to fit as these are, would bring at most this many
+    /// motions that explain as many of them.
+    pub false_alarms: f64,
+    /// Fewest matches that make a reading, whatever the chance of them.
     pub least_matches: usize,
+    /// Most readings of a view beside the first.
+    pub alternatives: usize,
+    /// A reading beside the first has at least this share of its matches.
+    pub alternative_share: f64,
     /// What a landmark is.
     pub landmarks: Landmarks,
     /// Features within this angle of one another make an object, rad.
@@ -127,14 +137,17 @@ impl Default for ExtractorSettings {
             ratio: 0.9,
             guided_ratio: 0.95,
             draws: 300,
-            least_matches: 16,
+            false_alarms: 1e-4,
+            least_matches: 8,
+            alternatives: 3,
+            alternative_share: 0.15,
             landmarks: Landmarks::Features,
             object_radius_rad: 0.07,
             object_features: 4,
-            sd_px: 0.05,
-            sd_per_scale: 0.02,
-            sd_per_scale_and_distance: 0.8,
-            variance_by_misfit: (0.55, 1.0),
+            sd_px: 0.18,
+            sd_per_scale: 0.078,
+            sd_per_scale_and_distance: 1.44,
+            variance_by_misfit: (0.2, 1.0),
             check_px: 0.16,
             check_per_scale: 0.1,
             seed: 0,
@@ -200,7 +213,10 @@ pub struct Extractor {
     objects: Option<Objects>,
     now: Vec<Feature>,
     descriptors: Vec<Descriptor>,
-    matches: Vec<Match>,
+    /// What the last panorama may show, likeliest first.
+    readings: Vec<Vec<Match>>,
+    /// Bearings of those after the first.
+    alternatives: Vec<Vec<Bearing>>,
 }
 
 impl Extractor {
@@ -244,7 +260,8 @@ impl Extractor {
             objects,
             now: Vec::new(),
             descriptors: Vec::new(),
-            matches: Vec::new(),
+            readings: Vec::new(),
+            alternatives: Vec::new(),
         }
     }
 
@@ -267,10 +284,24 @@ impl Extractor {
         HomeSnapshot { bearings }
     }
 
-    /// Bearings of the landmarks found in `now`, in the order of their ids, each at most once.
+    /// Bearings of the landmarks found in `now`, in the order of their ids, each at most once: those that one motion from home
+    /// explains, of all motions the one that explains most. None where chance would do as well.
     pub fn observe(&mut self, now: &Panorama) -> Vec<Bearing> {
         self.look(now);
-        let projection = now.projection;
+        let mut readings = self.readings.iter().map(|matches| self.bearings(matches, &now.projection));
+        let first = readings.next().unwrap_or_default();
+        self.alternatives = readings.collect();
+        first
+    }
+
+    /// What the last panorama may show instead, likeliest first: bearings that other motions explain, of landmarks that look like
+    /// others. Empty where one motion alone makes sense.
+    #[must_use]
+    pub fn alternatives(&self) -> &[Vec<Bearing>] {
+        &self.alternatives
+    }
+
+    fn bearings(&self, matches: &[Match], projection: &Projection) -> Vec<Bearing> {
         if let Some(objects) = &self.objects {
             let found = |m: &Match| Found {
                 feature: m.id.0 as usize,
@@ -278,18 +309,21 @@ impl Extractor {
                 sd_rad: (m.home_sd_rad * m.home_sd_rad + m.now_sd_rad * m.now_sd_rad).sqrt(),
                 zoom: m.now_scale_px / m.home_scale_px,
             };
-            return objects.bearings(&self.matches.iter().map(found).collect::<Vec<_>>());
+            return objects.bearings(&matches.iter().map(found).collect::<Vec<_>>());
         }
-        self.matches
-            .iter()
-            .map(|m| Bearing { id: m.id, azimuth_rad: projection.azimuth(m.now_px.0), sd_rad: m.now_sd_rad })
-            .collect()
+        let bearing = |m: &Match| Bearing { id: m.id, azimuth_rad: projection.azimuth(m.now_px.0), sd_rad: m.now_sd_rad };
+        matches.iter().map(bearing).collect()
     }
 
     /// The feature matches behind the last observation, in the order of their ids.
     #[must_use]
     pub fn matches(&self) -> &[Match] {
-        &self.matches
+        self.readings.first().map_or(&[], Vec::as_slice)
+    }
+
+    /// The feature matches behind each reading of the last panorama, likeliest reading first, each in the order of its ids.
+    pub fn readings(&self) -> impl Iterator<Item = &[Match]> {
+        self.readings.iter().map(Vec::as_slice)
     }
 
     /// Features of the last panorama that was observed.
@@ -319,29 +353,32 @@ impl Extractor {
     }
 
     fn look(&mut self, now: &Panorama) {
-        self.matches.clear();
         self.find_features(now);
-        let choices = self.match_features(&now.projection);
-        if choices.len() < self.settings.least_matches {
-            return;
+        let readings = self.match_features(&now.projection);
+        self.readings.clear();
+        for choices in readings {
+            let mut matches: Vec<Match> =
+                choices.iter().map(|(candidate, chi2)| self.as_match(candidate, *chi2, &now.projection)).collect();
+            matches.sort_by_key(|m| m.id);
+            self.readings.push(matches);
         }
-        for (candidate, chi2) in choices {
-            let (home, seen) = (&self.home[candidate.home], &self.now[candidate.now]);
-            let home_sd_rad = sd_rad(home, 0.0, &self.home_projection, &self.settings);
-            let sd_rad = sd_rad(seen, candidate.distance, &now.projection, &self.settings);
-            self.matches.push(Match {
-                id: LandmarkId(candidate.home as u32),
-                home_px: (f64::from(home.x), f64::from(home.y)),
-                now_px: (f64::from(seen.x), f64::from(seen.y)),
-                home_scale_px: f64::from(home.sigma),
-                now_scale_px: f64::from(seen.sigma),
-                distance: f64::from(candidate.distance),
-                misfit: chi2.sqrt(),
-                home_sd_rad,
-                now_sd_rad: given_misfit(home_sd_rad, sd_rad, chi2, &self.settings),
-            });
+    }
+
+    fn as_match(&self, candidate: &Candidate, chi2: f64, projection: &Projection) -> Match {
+        let (home, seen) = (&self.home[candidate.home], &self.now[candidate.now]);
+        let home_sd_rad = sd_rad(home, 0.0, &self.home_projection, &self.settings);
+        let sd_rad = sd_rad(seen, candidate.distance, projection, &self.settings);
+        Match {
+            id: LandmarkId(candidate.home as u32),
+            home_px: (f64::from(home.x), f64::from(home.y)),
+            now_px: (f64::from(seen.x), f64::from(seen.y)),
+            home_scale_px: f64::from(home.sigma),
+            now_scale_px: f64::from(seen.sigma),
+            distance: f64::from(candidate.distance),
+            misfit: chi2.sqrt(),
+            home_sd_rad,
+            now_sd_rad: given_misfit(home_sd_rad, sd_rad, chi2, &self.settings),
         }
-        self.matches.sort_by_key(|m| m.id);
     }
 
     /// Features and descriptors of the current panorama.
@@ -358,8 +395,8 @@ impl Extractor {
         self.descriptors = shared(self.now.len(), |some| self.now[some].iter().map(describe).collect());
     }
 
-    /// Matches that fit one planar motion.
-    fn match_features(&mut self, projection: &Projection) -> Vec<(Candidate, f64)> {
+    /// The readings of the view: matches that fit one planar motion each, with their misfits squared, likeliest first.
+    fn match_features(&self, projection: &Projection) -> Vec<Reading> {
         let settings = &self.settings;
         let seen = Seen { features: &self.now, descriptors: &self.descriptors, horizon: horizon(projection) };
         let limit = RUNNER_UP * settings.distance;
@@ -372,19 +409,56 @@ impl Extractor {
             let pair = |c: &Choice| Pair { home: self.home_sights[c.candidate.home], now: sights[c.candidate.now] };
             choices.iter().map(pair).collect()
         };
-        let first = matching::choose(&candidates, home, now, settings.distance, settings.ratio, |_| true);
-        let Some(motion) = motion::estimate(&pairs(&first), settings.draws, Seed(settings.seed)) else { return Vec::new() };
+        let distinct = matching::choose(&candidates, home, now, settings.distance, settings.ratio, |_| true);
+        let distinct = pairs(&distinct);
         // With the motion known, ambiguous matches are taken where they fit it; then once more with the motion of them all.
         let guided = |motion: PlanarMotion| {
             let frame = motion.frame();
             let fits = |c: &Candidate| frame.fit(&self.home_sights[c.home], &sights[c.now]).is_good();
             matching::choose(&candidates, home, now, settings.distance, settings.guided_ratio, fits)
         };
-        let motion = motion::polish(&pairs(&guided(motion)), motion);
-        let frame = motion.frame();
-        let chi2 = |c: &Candidate| frame.fit(&self.home_sights[c.home], &sights[c.now]).chi2;
-        guided(motion).into_iter().map(|c| (c.candidate, chi2(&c.candidate))).collect()
+        let read = |motion: PlanarMotion| -> Reading {
+            let frame = motion.frame();
+            let misfit =
+                |c: &Choice| (c.candidate, frame.fit(&self.home_sights[c.candidate.home], &sights[c.candidate.now]).chi2);
+            guided(motion).iter().map(misfit).collect()
+        };
+        let chance = Chance::of(&distinct, Seed(settings.seed));
+        let limit = libm::log(settings.false_alarms);
+        let mut readings: Vec<Reading> = Vec::new();
+        let mut left = distinct.clone();
+        while readings.len() <= settings.alternatives {
+            let Some(motion) = motion::estimate(&left, settings.draws, Seed(settings.seed)) else { break };
+            let motion = motion::polish(&pairs(&guided(motion)), motion);
+            let frame = motion.frame();
+            let fits = |pair: &Pair| frame.fit(&pair.home, &pair.now).is_good();
+            if chance.log_false_alarms(distinct.iter().filter(|pair| fits(pair)).count()) > limit {
+                break;
+            }
+            let unexplained = left.len();
+            left.retain(|pair| !fits(pair));
+            let reading = read(motion);
+            if reading.len() >= settings.least_matches && readings.iter().all(|other| is_another(&reading, other)) {
+                readings.push(reading);
+            }
+            if left.len() == unexplained {
+                break;
+            }
+        }
+        readings.sort_by_key(|reading| Reverse(reading.len()));
+        let most = readings.first().map_or(0, Vec::len) as f64;
+        readings.retain(|reading| reading.len() as f64 >= settings.alternative_share * most);
+        readings
     }
+}
+
+/// Matches that fit one motion, with their misfits squared.
+type Reading = Vec<(Candidate, f64)>;
+
+/// Whether a reading tells something else than `other`: most of its matches are not among that one's.
+fn is_another(reading: &Reading, other: &Reading) -> bool {
+    let told: BTreeSet<(usize, usize)> = other.iter().map(|(c, _)| (c.home, c.now)).collect();
+    2 * reading.iter().filter(|(c, _)| told.contains(&(c.home, c.now))).count() < reading.len()
 }
 
 /// Most pieces of work for each thread: more than one, for they take unequal time.

@@ -21,8 +21,9 @@
 //! Two matches fix (d, alpha) in closed form; random pairs propose motions, all matches judge them, Gauss-Newton steps
 //! polish the best. Elevations serve only here, to tell right matches from wrong: what leaves vision is azimuths.
 
-use std::f64::consts::PI;
+use std::f64::consts::{PI, TAU};
 
+use rand::RngExt;
 use rand_pcg::rand_core::Rng;
 
 use crate::geometry::{Vector2, cross, direction, wrap};
@@ -221,6 +222,57 @@ pub(super) fn estimate(pairs: &[Pair], draws: usize, seed: Seed) -> Option<Plana
         }
     }
     best.filter(|(score, _)| *score > 2.0).map(|(_, motion)| motion)
+}
+
+/// How ready the matches of a view are to fit a motion that has nothing to do with them, after Moisan and Stival's a-contrario
+/// criterion (2004): what wrong matches would do as well proves nothing.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Chance {
+    /// Matches.
+    count: usize,
+    /// Probability that one of them fits a motion drawn blindly.
+    fit: f64,
+}
+
+impl Chance {
+    /// Motions drawn to find out. On 3,237 views of generated rooms the probability is 0.02 to 0.03.
+    const BLIND: usize = 24;
+    /// However rarely matches fit, this probability is supposed.
+    const LEAST_FIT: f64 = 0.005;
+
+    /// Asks how many of `pairs` fit motions drawn blindly.
+    pub fn of(pairs: &[Pair], seed: Seed) -> Self {
+        let mut stream = seed.stream("vision/chance");
+        let mut angle = || TAU * stream.random::<f64>();
+        let fits = |_| {
+            let frame = PlanarMotion { direction_rad: angle(), turn_rad: angle() }.frame();
+            pairs.iter().filter(|pair| frame.fit(&pair.home, &pair.now).is_good()).count()
+        };
+        let all: usize = (0..Self::BLIND).map(fits).sum();
+        let fit = all as f64 / (Self::BLIND * pairs.len()).max(1) as f64;
+        Self { count: pairs.len(), fit: fit.max(Self::LEAST_FIT) }
+    }
+
+    /// Natural logarithm of the number of motions that would be expected to explain at least `right` of the matches if all of them
+    /// were wrong: the tail of a binomial distribution, for each motion that two of the matches propose.
+    pub fn log_false_alarms(&self, right: usize) -> f64 {
+        if right < 3 {
+            return f64::INFINITY;
+        }
+        // Two of them made the motion.
+        let (n, k) = (self.count - 2, right - 2);
+        let proposed = 2.0 * (self.count * (self.count - 1)) as f64;
+        let (of, log) = (|k: usize| libm::lgamma(k as f64 + 1.0), libm::log);
+        let first = of(n) - of(k) - of(n - k) + k as f64 * log(self.fit) + (n - k) as f64 * log(1.0 - self.fit);
+        // The terms after the first one, by their ratios.
+        let odds = self.fit / (1.0 - self.fit);
+        let next = |(term, sum): (f64, f64), j: usize| {
+            let term = term * odds * (n - j) as f64 / (j + 1) as f64;
+            (term, sum + term)
+        };
+        let (_, sum) = (k..n).fold((1.0, 1.0), next);
+        log(proposed) + first + log(sum)
+    }
 }
 
 /// The motions through two matches: those with the opposite step, which fit (1) as well, are left to `judge`.
