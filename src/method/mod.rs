@@ -288,8 +288,11 @@ impl Method for AnchoredHoming {
             (None, Some(guess)) => self.search(&guess, observation.time_s),
             (None, None) => Twist { v: 0.0, omega: 0.6 },
         };
-        let command =
-            if self.arrived { command } else { self.escape.guard(observation.time_s, &self.filter.map_pose(), command) };
+        let command = if self.arrived {
+            command
+        } else {
+            self.escape.guard(observation.time_s, &self.filter.map_pose(), observation.bumper, command)
+        };
         self.speed_m_s = command.v;
         let status = if self.arrived { Status::Arrived } else { Status::Running };
         let nis = if report.matched > 0 { report.nis / report.matched as f64 } else { f64::NAN };
