@@ -1,6 +1,7 @@
 //! Estimators: where is the robot relative to home, from bearings and odometry alone.
 //!
 //! - [`anchored`]: the filter of the main job; nothing needs to be known at the start.
+//! - [`homes`]: several of them at once, where a view may show more than one place.
 //! - [`paper`]: the paper's six-state EKF, exactly as printed but for the transition Jacobian; it must be started near the truth.
 //! - [`observability`]: what of the paper's state its bearings can tell at all.
 //! - [`resection`] and [`gaussian`] serve the anchored filter.
@@ -10,6 +11,7 @@
 pub mod anchored;
 mod dense;
 pub mod gaussian;
+pub mod homes;
 pub mod observability;
 pub mod paper;
 pub mod resection;

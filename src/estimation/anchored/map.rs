@@ -230,6 +230,20 @@ impl Map {
         (held, fits)
     }
 
+    /// How many of the bearings are of landmarks that the map holds, and how many of these a robot at `pose` would see to within
+    /// `about_rad`.
+    #[must_use]
+    pub fn agreement(&self, pose: &Pose, bearings: &[Bearing], about_rad: f64) -> (usize, usize) {
+        let index = self.index();
+        let off = |bearing: &Bearing| {
+            let c = LANDMARKS + 2 * index.get(bearing.id)?;
+            let (predicted, _) = predict_bearing(pose, self.belief.mean[c], self.belief.mean[c + 1]);
+            Some(wrap(bearing.azimuth_rad - predicted).abs())
+        };
+        let off: Vec<f64> = bearings.iter().filter_map(off).collect();
+        (off.len(), off.iter().filter(|off| **off <= about_rad).count())
+    }
+
     /// What resection of the robot needs: the landmarks among the bearings with what the map knows of them.
     #[must_use]
     pub fn sightings(&self, bearings: &[Bearing]) -> Vec<resection::Sighting> {

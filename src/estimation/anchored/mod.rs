@@ -128,6 +128,8 @@ pub struct StepReport {
     pub nis: f64,
 }
 
+/// A bearing this near to where it is expected, rad, agrees with the map: a reading of another place lies elsewhere by far.
+const ABOUT_RAD: f64 = 0.1;
 /// Farthest from the first anchor at which landmarks are still added to it, m: farther off a first bearing says little about
 /// the direction from the anchor.
 const FIRST_ANCHOR_REACH_M: f64 = 0.5;
@@ -271,6 +273,15 @@ impl AnchoredFilter {
     #[must_use]
     pub fn map_pose(&self) -> Pose {
         self.lever.axle_pose(&self.map.pose())
+    }
+
+    /// How many of `bearings` are of landmarks that the map holds, and how many of these lie about where the map expects them after
+    /// this odometry.
+    #[must_use]
+    pub fn agreement(&self, odometry: &Odometry, bearings: &[Bearing]) -> (usize, usize) {
+        let axle = Motion::from_odometry(odometry, 0.0, &self.settings);
+        let pose = self.map.pose().compose(&self.lever.camera_motion(&axle).delta);
+        self.map.agreement(&pose, bearings, ABOUT_RAD)
     }
 
     /// Time update and measurement update.
