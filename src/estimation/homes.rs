@@ -32,23 +32,25 @@ const SAME: f64 = 0.4;
 /// Home landmarks for each sector of the snapshot, and sectors at most.
 const SECTORS: (usize, usize) = (10, 12);
 /// Steps on the way to a home whose sightings count together: what someone hid in one of them shows in another.
-const LATELY: usize = 30;
+const LATELY: usize = 20;
 
 /// Share of home's landmarks from which on the view is home's, whatever else may look like it. Seen in 274 runs in generated rooms that
 /// nothing was claimed for: 0.52 to 0.89 at home, in nine of ten 0.6 and more; 0.13 to 0.54 at 23 other places.
-const WHOLE: f64 = 0.6;
+const WHOLE: f64 = 0.64;
 /// The same where no other answer is seen.
 const MOSTLY: f64 = 0.53;
 /// Unevenness up to which what is missing is missing by chance.
 const EVEN: f64 = 4.0;
-/// ... if at least this share of them is seen.
-const LEAST: f64 = 0.08;
+/// ... if at least this share of them is seen; a third of it below.
+const LEAST: f64 = 0.2;
 /// Unevenness up to which people who stand around explain it: of 25 runs in a crowd one showed more, 15.9.
 const CROWDED: f64 = 14.0;
 /// Share of home's landmarks from which on people may hide the rest, ...
 const HIDDEN: f64 = 0.37;
 /// ... if this share of them was seen lately. In the crowd it is 0.73 to 0.82, on the way to other places 0.40 to 0.70 but for two.
-const MET: f64 = 0.68;
+const MET: f64 = 0.73;
+/// The same, however uneven the view is.
+const SURELY_MET: f64 = 0.8;
 /// A rival counts if its reading has this share of the landmarks of the leader's.
 const STRONG: f64 = 0.25;
 /// Two homes whose views agree with home's as well as this, one over the other, cannot be told apart.
@@ -69,8 +71,9 @@ pub struct View {
 impl View {
     /// Whether this can be home seen through what has come since.
     fn may_be_home(&self) -> bool {
-        let hidden_by_people = self.share >= HIDDEN && self.lately >= MET && self.unevenness < CROWDED;
-        let by_chance = self.share >= LEAST && self.unevenness < EVEN;
+        let crowded = self.lately >= MET && self.unevenness < CROWDED || self.lately >= SURELY_MET;
+        let hidden_by_people = self.share >= HIDDEN && crowded;
+        let by_chance = self.unevenness < if self.share >= LEAST { EVEN } else { EVEN / 3.0 };
         self.share >= MOSTLY && self.unevenness < CROWDED || by_chance || hidden_by_people
     }
 }
@@ -137,6 +140,11 @@ impl Answer {
         self.filter.step(odometry, reading)
     }
 
+    /// Whether it is seen now, and its home was not looked at yet.
+    fn is_open(&self) -> bool {
+        self.visited.is_none() && self.silent_steps <= SILENT_STEPS
+    }
+
     /// Whether it says the same as `other`.
     fn is_as(&self, other: &Self) -> bool {
         match (self.filter.estimate(), other.filter.estimate()) {
@@ -197,10 +205,10 @@ impl Homes {
         self.answers.is_empty()
     }
 
-    /// Whether all answers were looked at, and none can be home.
+    /// Whether all answers that are seen now were looked at, and none can be home.
     #[must_use]
     pub fn are_exhausted(&self) -> bool {
-        self.answers.iter().all(|answer| answer.visited.is_some_and(|found| !found.possible))
+        self.answers[0].visited.is_some_and(|found| !found.possible) && !self.answers.iter().any(Answer::is_open)
     }
 
     /// Time update and measurement update of all answers. Returns what the leader's did.
@@ -305,19 +313,19 @@ impl Homes {
     /// Puts the answer first that is to be driven to: of those not looked at yet the one with most support, else the one whose home
     /// looked most like home.
     fn elect(&mut self) {
-        let open = |answer: &Answer| answer.visited.is_none() && answer.silent_steps <= SILENT_STEPS;
         let better = |a: &usize, b: &usize| self.answers[*a].support.total_cmp(&self.answers[*b].support).then(b.cmp(a));
-        let best = (0..self.answers.len()).filter(|&k| open(&self.answers[k])).max_by(better);
+        let heard = |k: &usize| self.answers[*k].silent_steps <= SILENT_STEPS;
+        let best = (0..self.answers.len()).filter(|&k| self.answers[k].is_open()).max_by(better);
         let next = match best {
             Some(k) if k > 0 => {
                 let (rival, leader) = (&self.answers[k], &self.answers[0]);
                 (leader.visited.is_some() || rival.support > TAKES_LEAD * leader.support).then_some(k)
             }
             Some(_) => None,
-            None if self.answers[0].visited.is_none() => None,
             None => {
                 let looked = |k: &usize| self.answers[*k].visited.map_or(0.0, |found| found.worth());
-                (0..self.answers.len()).max_by(|a, b| looked(a).total_cmp(&looked(b)).then(b.cmp(a))).filter(|&k| k > 0)
+                let best = (0..self.answers.len()).filter(heard).max_by(|a, b| looked(a).total_cmp(&looked(b)).then(b.cmp(a)));
+                best.filter(|&k| k > 0)
             }
         };
         if let Some(k) = next {
@@ -394,7 +402,7 @@ impl Homes {
 
     /// Greatest support of a ripe answer beside the leader that is seen now and whose home was not looked at.
     fn rival_support(&self) -> f64 {
-        let open = |a: &&Answer| a.visited.is_none() && a.silent_steps <= SILENT_STEPS && a.steps >= RIPE_STEPS;
-        self.answers[1..].iter().filter(open).map(|a| a.support).fold(0.0, f64::max)
+        let ripe = |a: &&Answer| a.is_open() && a.steps >= RIPE_STEPS;
+        self.answers[1..].iter().filter(ripe).map(|a| a.support).fold(0.0, f64::max)
     }
 }

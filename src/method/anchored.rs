@@ -25,8 +25,10 @@ const AT_REST_M: f64 = 0.0015;
 const REST_STEPS: u32 = 5;
 /// Creeping speed while the estimate is home but not yet sure, m/s.
 const CREEP_M_S: f64 = 0.06;
-/// Steps for which the robot stays at a home that the view denies.
-const DWELL_STEPS: u32 = 15;
+/// Time for which the robot stays at a home that the view denies, s, ...
+const DWELL_S: f64 = 1.5;
+/// ... and looks for others before it comes back.
+const ELSEWHERE_S: f64 = 7.0;
 /// Time for which a robot that sees nothing of home turns on the spot, s.
 const LOOK_AROUND_S: f64 = 3.0;
 /// Manoeuvres round obstacles on the way to one place after which another one is tried.
@@ -57,8 +59,8 @@ pub(super) struct AnchoredHoming {
     /// Manoeuvres of it when the leading answer was last changed.
     manoeuvres: u32,
     status: Status,
-    /// How often home was reached and the view from there denied it.
-    doubts: u32,
+    /// Until when the robot looks for homes elsewhere, s.
+    elsewhere_until_s: Option<f64>,
 }
 
 impl AnchoredHoming {
@@ -78,7 +80,7 @@ impl AnchoredHoming {
             escape: Escape::new(briefing.robot, briefing.task),
             manoeuvres: 0,
             status: Status::Running,
-            doubts: 0,
+            elsewhere_until_s: None,
         }
     }
 
@@ -134,12 +136,10 @@ impl Method for AnchoredHoming {
                         Verdict::Ambiguous => Status::Lost,
                         Verdict::Doubtful => Status::Running,
                     };
-                    self.doubts += u32::from(self.status == Status::Running);
                     self.manoeuvres = self.escape.manoeuvres();
                 }
                 if self.homes.are_exhausted() && self.status == Status::Running {
-                    // People who hide part of home's view walk on.
-                    if self.doubts < DWELL_STEPS { Twist::default() } else { self.wander(observation.time_s) }
+                    self.look_elsewhere(arrived, observation.time_s).unwrap_or(command)
                 } else {
                     command
                 }
@@ -169,6 +169,19 @@ impl AnchoredHoming {
         let towards = wrap(crate::geometry::angle_of(-guess.position()) - guess.heading);
         let weave = 0.25 * libm::sin(2.0 * std::f64::consts::PI * time_s / 3.0);
         self.controller.follow(towards + weave)
+    }
+
+    /// Command where the view denies every home that it leads to: people who hide part of it may walk on, so the robot stays a moment,
+    /// looks for others elsewhere, and comes back for another look; `None` on that way back.
+    fn look_elsewhere(&mut self, arrived: bool, time_s: f64) -> Option<Twist> {
+        if arrived && self.elsewhere_until_s.is_none_or(|until_s| time_s >= until_s) {
+            self.elsewhere_until_s = Some(time_s + DWELL_S + ELSEWHERE_S);
+        }
+        let left_s = self.elsewhere_until_s? - time_s;
+        if left_s <= 0.0 {
+            return None;
+        }
+        Some(if left_s > ELSEWHERE_S { Twist::default() } else { self.wander(time_s) })
     }
 
     /// Command where nothing is seen of home: a turn on the spot, then on to another place.

@@ -151,7 +151,7 @@ impl Default for ExtractorSettings {
             sd_per_scale: 0.12,
             sd_per_scale_and_distance: 2.2,
             variance_by_misfit: (0.25, 1.05),
-            usual_misfit: 0.2,
+            usual_misfit: 0.22,
             check_px: 0.16,
             check_per_scale: 0.1,
             seed: 0,

@@ -143,8 +143,9 @@ const MISFIT_SHARE: f64 = 0.3;
 const REBUILD_SHARE: usize = 24;
 /// Times that the smoother is run at most, each time without what did not fit the time before.
 const SMOOTHER_ROUNDS: usize = 4;
-/// Greatest mean squared normalised residual of a solution that is believed.
-const GREATEST_MEAN_SQUARE: f64 = 2.5;
+/// Greatest mean squared normalised residual of a solution that is believed; above the lesser one, its covariance grows with it.
+const GREATEST_MEAN_SQUARE: f64 = 5.0;
+const USUAL_MEAN_SQUARE: f64 = 1.2;
 
 /// How well a robot that was carried off must be found on the map, m; else the search begins anew.
 const RELOCATION_SD_M: f64 = 0.15;
@@ -575,7 +576,7 @@ impl AnchoredFilter {
             // Wrong matches are told apart first, then what is left is taken at its word.
             let heavy_tails = round == 1;
             let stretch = Stretch { frames: &frames, priors: &priors, heavy_tails };
-            let solution = stretch.solve(start)?;
+            let mut solution = stretch.solve(start)?;
             let mut seen = vec![(0_usize, 0_usize); ids.len()];
             let mut clean = true;
             for (motion, &squared) in motions.iter_mut().zip(&solution.motions_squared) {
@@ -601,8 +602,12 @@ impl AnchoredFilter {
             let kept: Vec<usize> = (0..ids.len()).filter(|&k| keeps(k)).collect();
             if !heavy_tails && (clean || round == SMOOTHER_ROUNDS) && kept.len() == ids.len() {
                 let squares = &solution.residuals_squared;
-                let believed = squares.iter().sum::<f64>() <= GREATEST_MEAN_SQUARE * squares.len() as f64;
-                return believed.then_some((ids, solution, motions));
+                let mean = squares.iter().sum::<f64>() / squares.len().max(1) as f64;
+                // The variance factor of an adjustment: the room tells how exact its bearings are.
+                if mean > USUAL_MEAN_SQUARE {
+                    solution.scatter = mean;
+                }
+                return (mean <= GREATEST_MEAN_SQUARE).then_some((ids, solution, motions));
             }
             start = Iterate {
                 poses: solution.at.poses.clone(),

@@ -51,6 +51,8 @@ pub struct Solution {
     pub residuals_squared: Vec<f64>,
     /// Squared Mahalanobis distance between how the robot came to each frame and what odometry tells; 0 for the first.
     pub motions_squared: Vec<f64>,
+    /// By how much the sightings scatter more than their variances say: what [`Solution::last`] enlarges its covariance by.
+    pub scatter: f64,
     /// Cholesky factor of the information of (last pose, landmarks).
     factor: Vec<f64>,
 }
@@ -63,7 +65,7 @@ impl Solution {
         let n = 3 + 2 * self.at.landmarks.len();
         let state = [pose.x, pose.y, pose.heading].into_iter().chain(self.at.landmarks.iter().flatten().copied());
         let mean = DVector::from_iterator(n, state);
-        let covariance = dense::inverse(&self.factor, n);
+        let covariance = self.scatter * dense::inverse(&self.factor, n);
         (mean.iter().all(|v| v.is_finite()) && covariance.iter().all(|v| v.is_finite())).then_some((mean, covariance))
     }
 }
@@ -145,7 +147,7 @@ impl Stretch<'_> {
             }
         }
         let residuals_squared = here.bearings.iter().map(|r| r.squared).collect();
-        Some(Solution { at, residuals_squared, motions_squared: here.motions_squared, factor: information? })
+        Some(Solution { at, residuals_squared, motions_squared: here.motions_squared, scatter: 1.0, factor: information? })
     }
 
     /// Covariance of (last pose, landmarks) by the information at given poses and landmarks. At the true ones, and without heavy
