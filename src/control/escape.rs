@@ -207,4 +207,38 @@ mod tests {
         assert!(pose.x > 3.0, "{pose:?}");
         assert!((1..=2).contains(&manoeuvres), "{manoeuvres}");
     }
+
+    /// The same before a wall from -1.2 to 1 m: felt by the bumper, it is followed to its end.
+    #[test]
+    fn a_wide_wall_is_followed_to_its_end() {
+        let robot = RobotSheet {
+            track_m: 0.23,
+            camera_offset_m: [0.0; 2],
+            max_speed_m_s: 0.3,
+            max_turn_rate_rad_s: 1.9,
+            max_acceleration_m_s2: 0.9,
+        };
+        let task = TaskSheet { speed_m_s: 0.3, control_period_s: 0.1, arrival_radius_m: 0.05 };
+        let mut escape = Escape::new(robot, task);
+        let (mut pose, mut bumper) = (Pose::IDENTITY, Bumper::default());
+        let mut contacts = 0;
+        for step in 0..600 {
+            let home = crate::geometry::angle_of(crate::geometry::Vector2::new(3.0, 0.0) - pose.position());
+            let law = Twist { v: 0.3, omega: (2.0 * wrap(home - pose.heading)).clamp(-1.9, 1.9) };
+            let command = escape.guard(0.1 * f64::from(step), &pose, bumper, law);
+            let next = pose.advanced(command, 0.1);
+            let hits = pose.x < 0.5 && next.x >= 0.5 && (-1.2..1.0).contains(&next.y);
+            bumper = Bumper::default();
+            if hits {
+                bumper.press(wrap(-pose.heading));
+            }
+            contacts += u32::from(hits);
+            pose = if hits { Pose { heading: next.heading, ..pose } } else { next };
+            if pose.x > 2.5 {
+                break;
+            }
+        }
+        assert!(pose.x > 2.5, "{pose:?} after {} manoeuvres", escape.manoeuvres());
+        assert!((2..=5).contains(&escape.manoeuvres()) && contacts < 40, "{} manoeuvres, {contacts}", escape.manoeuvres());
+    }
 }

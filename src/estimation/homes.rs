@@ -406,3 +406,70 @@ impl Homes {
         self.answers[1..].iter().filter(ripe).map(|a| a.support).fold(0.0, f64::max)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::angle_of;
+    use crate::observation::Bearing;
+
+    /// Landmarks on a ring of radius 3 m, every three degrees, and the bearings of those that `sees` lets through from `pose`.
+    fn see(pose: &Pose, sees: impl Fn(u32) -> bool) -> Vec<Bearing> {
+        let bearing = |k: u32| {
+            let at = crate::geometry::direction(TAU * f64::from(k) / 120.0) * 3.0;
+            Bearing { id: LandmarkId(k), azimuth_rad: angle_of(pose.inverse_transform(at)), sd_rad: 0.002 }
+        };
+        (0..120).filter(|&k| sees(k)).map(bearing).collect()
+    }
+
+    /// Drives from 2 m off to home, seeing what `sees` lets through, and asks there.
+    fn verdict(sees: impl Fn(u32) -> bool) -> (Verdict, View) {
+        let mut homes = Homes::new(FilterSettings::default(), &HomeSnapshot { bearings: see(&Pose::IDENTITY, |_| true) });
+        let twist = crate::geometry::Twist { v: 0.25, omega: 0.0 };
+        let mut pose = Pose::new(-2.0, 0.3, -0.15);
+        homes.step(&Odometry::default(), &see(&pose, &sees), &[]);
+        for _ in 0..80 {
+            pose = pose.advanced(twist, 0.1);
+            homes.step(&Odometry { twist, dt_s: 0.1 }, &see(&pose, &sees), &[]);
+        }
+        assert!(homes.leader().estimate().is_some());
+        (homes.judge(), homes.view())
+    }
+
+    #[test]
+    fn home_is_claimed_where_the_whole_view_or_an_even_part_of_it_is_seen() {
+        assert_eq!(verdict(|_| true).0, Verdict::Home);
+        let (verdict, view) = verdict(|k| (k * 7919) % 10 < 4);
+        assert_eq!(verdict, Verdict::Home, "what is missing is missing by chance: {view:?}");
+        assert!((view.share - 0.4).abs() < 0.02 && view.unevenness < 1.5, "{view:?}");
+    }
+
+    /// A wall that repeats itself makes a place look like home on one side only.
+    #[test]
+    fn a_place_that_looks_like_home_on_one_side_is_denied() {
+        let (verdict, view) = verdict(|k| k < 50);
+        assert_eq!(verdict, Verdict::Doubtful, "{view:?}");
+        assert!(view.unevenness > EVEN && (view.share - 50.0 / 120.0).abs() < 1e-12, "{view:?}");
+    }
+
+    /// Two readings of all views, by landmarks of the one and of the other half of the room: home here, and home 1 m to the left. Each has an
+    /// answer of its own, which leads where it explains more.
+    #[test]
+    fn two_readings_of_a_view_are_two_answers() {
+        let mut homes = Homes::new(FilterSettings::default(), &HomeSnapshot { bearings: see(&Pose::IDENTITY, |_| true) });
+        let twist = crate::geometry::Twist { v: 0.2, omega: 0.1 };
+        let beside = Pose::new(0.0, 1.0, 0.0);
+        let mut pose = Pose::new(-1.5, -0.4, 0.3);
+        for step in 0..60 {
+            let odometry = if step == 0 { Odometry::default() } else { Odometry { twist, dt_s: 0.1 } };
+            let (one, other) = (see(&pose, |k| k < 70), see(&beside.to_local(&pose), |k| k >= 70));
+            homes.step(&odometry, &one, &[other]);
+            pose = pose.advanced(twist, 0.1);
+        }
+        let found: Vec<Pose> = homes.answers.iter().filter_map(|a| a.filter.estimate()).map(|e| e.pose).collect();
+        assert_eq!(found.len(), 2, "{found:?}");
+        let apart = (found[0].position() - found[1].position()).norm();
+        assert!((apart - 1.0).abs() < 0.1, "{found:?}");
+        assert!((homes.answers[0].support, homes.answers[1].support) == (70.0, 50.0));
+    }
+}

@@ -444,4 +444,24 @@ mod tests {
     fn too_few_matches_give_no_motion() {
         assert!(estimate(&room(Pose::new(1.0, 0.0, 0.0), 0)[..2], 300, Seed(0)).is_none());
     }
+
+    /// The tail of the binomial distribution against its sum, term by term; and right matches against the same ones shuffled.
+    #[test]
+    fn chance_explains_shuffled_matches_and_no_right_ones() {
+        let chance = Chance { count: 12, fit: 0.2 };
+        let term = |n: i32, j: i32| {
+            let choose = (1..=j).map(|i| f64::from(n - j + i) / f64::from(i)).product::<f64>();
+            choose * 0.2_f64.powi(j) * 0.8_f64.powi(n - j)
+        };
+        let tail: f64 = (3..=10).map(|j| term(10, j)).sum();
+        assert!((chance.log_false_alarms(5) - (2.0 * 12.0 * 11.0 * tail).ln()).abs() < 1e-12);
+        for wrong in [0, 10] {
+            let pairs = room(Pose::new(1.2, -0.7, 2.0), wrong);
+            let chance = Chance::of(&pairs, Seed(0));
+            let motion = estimate(&pairs, 300, Seed(0)).expect("a motion");
+            let right = pairs.iter().filter(|p| motion.frame().fit(&p.home, &p.now).is_good()).count();
+            let log = chance.log_false_alarms(right);
+            assert!(if wrong == 0 { log < -100.0 } else { log > -10.0 }, "{right} of 200 fit: {log}, {chance:?}");
+        }
+    }
 }
