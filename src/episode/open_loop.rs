@@ -53,9 +53,13 @@ impl Commands {
     /// Reads a table from CSV text with the columns `t_s,v_m_s,omega_rad_s`, in any order. `source` names it in messages.
     ///
     /// # Errors
-    /// When a column is missing or unknown, a cell is empty or no finite number, the times do not begin at 0 or do not grow by at least
-    /// a millisecond, or there are fewer than two rows. The message names line and field.
+    /// When a column is missing or unknown, a cell is empty or no finite number, a line is blank in between, the times do not begin at 0 or
+    /// do not grow by at least a millisecond, or there are fewer than two rows. The message names line and field.
     pub fn parse(text: &str, source: &Path) -> Result<Self> {
+        if let Some(k) = text.trim_end().lines().position(|line| line.trim().is_empty()) {
+            let message = format!("line {}: found a blank line, expected a row in every line up to the last", k + 1);
+            return Err(Error::Parse { path: source.to_owned(), message });
+        }
         let table = Rows::parse(text.as_bytes(), source, "command")?;
         let [time, v, omega] = table.exactly(COLUMNS)?;
         let mut rows: Vec<(f64, Twist)> = Vec::new();
