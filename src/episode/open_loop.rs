@@ -56,8 +56,8 @@ impl Commands {
     /// When a column is missing or unknown, a cell is empty or no finite number, a line is blank in between, the times do not begin at 0 or
     /// do not grow by at least a millisecond, or there are fewer than two rows. The message names line and field.
     pub fn parse(text: &str, source: &Path) -> Result<Self> {
-        if let Some(k) = text.trim_end().lines().position(|line| line.trim().is_empty()) {
-            let message = format!("line {}: found a blank line, expected a row in every line up to the last", k + 1);
+        if let Some(k) = text.trim_end().lines().skip(1).position(|line| line.trim().is_empty()) {
+            let message = format!("line {}: found a blank line, expected a row in every line up to the last", k + 2);
             return Err(Error::Parse { path: source.to_owned(), message });
         }
         let table = Rows::parse(text.as_bytes(), source, "command")?;
@@ -273,6 +273,7 @@ mod tests {
             ("0,0,0\n1,NaN,0\n", ["line 3", "v_m_s", "NaN"]),
             ("0,0,0\n1,0,inf\n", ["line 3", "omega_rad_s", "inf"]),
             ("0,0,0\n1,,0\n", ["line 3", "v_m_s", "found ``"]),
+            ("0,0,0\n\n1,0,0\n", ["line 3", "row", "blank line"]),
             ("0,0,0\n1,0\n", ["line 3", "found `1,0`", "3 cells"]),
             ("0,0,0\n2,0,0\n1,0,0\n", ["line 4", "t_s", "found `1`"]),
             ("0,0,0\n0,0,0\n", ["line 3", "t_s", "found `0`"]),
