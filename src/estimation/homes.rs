@@ -193,18 +193,6 @@ impl Homes {
         &mut self.answers[0].filter
     }
 
-    /// How many answers are held.
-    #[must_use]
-    pub fn len(&self) -> usize {
-        self.answers.len()
-    }
-
-    /// Whether there are none; never so.
-    #[must_use]
-    pub fn is_empty(&self) -> bool {
-        self.answers.is_empty()
-    }
-
     /// Whether all answers that are seen now were looked at, and none can be home.
     #[must_use]
     pub fn are_exhausted(&self) -> bool {
@@ -422,8 +410,8 @@ mod tests {
         (0..120).filter(|&k| sees(k)).map(bearing).collect()
     }
 
-    /// Drives from 2 m off to home, seeing what `sees` lets through, and asks there.
-    fn verdict(sees: impl Fn(u32) -> bool) -> (Verdict, View) {
+    /// Drives from 2 m off to home, seeing what `sees` lets through.
+    fn driven_home(sees: impl Fn(u32) -> bool) -> Homes {
         let mut homes = Homes::new(FilterSettings::default(), &HomeSnapshot { bearings: see(&Pose::IDENTITY, |_| true) });
         let twist = crate::geometry::Twist { v: 0.25, omega: 0.0 };
         let mut pose = Pose::new(-2.0, 0.3, -0.15);
@@ -433,7 +421,24 @@ mod tests {
             homes.step(&Odometry { twist, dt_s: 0.1 }, &see(&pose, &sees), &[]);
         }
         assert!(homes.leader().estimate().is_some());
+        homes
+    }
+
+    fn verdict(sees: impl Fn(u32) -> bool) -> (Verdict, View) {
+        let mut homes = driven_home(sees);
         (homes.judge(), homes.view())
+    }
+
+    /// As much as is seen here was seen at another place that may be home: nothing tells the two apart. Where less was seen there, this
+    /// is home.
+    #[test]
+    fn two_places_that_look_alike_are_ambiguous() {
+        let judged = |share: f64| {
+            let mut homes = driven_home(|k| (k * 7919) % 10 < 4);
+            homes.places.push((Vector2::new(0.0, 3.0), Found { share, possible: true }));
+            homes.judge()
+        };
+        assert_eq!([0.4, 0.3].map(judged), [Verdict::Ambiguous, Verdict::Home]);
     }
 
     #[test]
