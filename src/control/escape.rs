@@ -180,10 +180,7 @@ impl Escape {
 mod tests {
     use super::*;
 
-    /// A point robot before a wall from (0.5, -0.3) to (0.5, 0.3), told to drive along +x, comes past it and is left alone in
-    /// free space.
-    #[test]
-    fn a_blocked_robot_gets_past_and_a_free_one_is_left_alone() {
+    fn escape() -> Escape {
         let robot = RobotSheet {
             track_m: 0.23,
             camera_offset_m: [0.0; 2],
@@ -191,8 +188,14 @@ mod tests {
             max_turn_rate_rad_s: 1.9,
             max_acceleration_m_s2: 0.9,
         };
-        let task = TaskSheet { speed_m_s: 0.3, control_period_s: 0.1, arrival_radius_m: 0.05 };
-        let mut escape = Escape::new(robot, task);
+        Escape::new(robot, TaskSheet { speed_m_s: 0.3, control_period_s: 0.1, arrival_radius_m: 0.05 })
+    }
+
+    /// A point robot before a wall from (0.5, -0.3) to (0.5, 0.3), told to drive along +x, comes past it and is left alone in
+    /// free space.
+    #[test]
+    fn a_blocked_robot_gets_past_and_a_free_one_is_left_alone() {
+        let mut escape = escape();
         let mut pose = Pose::IDENTITY;
         let mut manoeuvres = 0;
         for step in 0..400 {
@@ -211,15 +214,7 @@ mod tests {
     /// The same before a wall from -1.2 to 1 m: felt by the bumper, it is followed to its end.
     #[test]
     fn a_wide_wall_is_followed_to_its_end() {
-        let robot = RobotSheet {
-            track_m: 0.23,
-            camera_offset_m: [0.0; 2],
-            max_speed_m_s: 0.3,
-            max_turn_rate_rad_s: 1.9,
-            max_acceleration_m_s2: 0.9,
-        };
-        let task = TaskSheet { speed_m_s: 0.3, control_period_s: 0.1, arrival_radius_m: 0.05 };
-        let mut escape = Escape::new(robot, task);
+        let mut escape = escape();
         let (mut pose, mut bumper) = (Pose::IDENTITY, Bumper::default());
         let mut contacts = 0;
         for step in 0..600 {
