@@ -6,13 +6,14 @@ use std::time::Instant;
 
 use super::parts::{Parts, PlantMaker, Shared};
 use super::record::{Outcome, Pictures, Record, Step, Timing};
-use super::recorder::{Moment, Recorder};
+use super::recorder::Recorder;
+use super::running::{Episode, Phase};
 use super::setup::{Setup, StopRule};
 use super::summary::Summary;
 use crate::error::{Error, Result, go_on};
 use crate::geometry::{Pose, Twist, wrap};
 use crate::method;
-use crate::observation::{Bearing, Briefing, Decision, Estimate, Method, Observation, Odometry, Status};
+use crate::observation::{Briefing, Decision, Estimate, Method, Observation, Odometry, Status};
 use crate::panorama::Panorama;
 use crate::physics::{Collision, Plant};
 use crate::random::Seed;
@@ -24,28 +25,6 @@ use crate::world::{TaskSpec, World};
 const REST_LIMIT_S: f64 = 1.0;
 /// Speeds below which the robot is at rest, m/s and rad/s.
 const REST_TWIST: Twist = Twist { v: 1e-3, omega: 5e-3 };
-
-/// A robot is stuck when it was told to move all through this time, s ...
-const STUCK_WINDOW_S: f64 = 5.0;
-/// ... and stayed within this distance, m, ...
-const STUCK_DISTANCE_M: f64 = 0.02;
-/// ... and this angle of where it is, rad.
-const STUCK_TURN_RAD: f64 = 0.1;
-/// Commands below these count as not told to move, m/s and rad/s.
-const IDLE_TWIST: Twist = Twist { v: 0.005, omega: 0.02 };
-
-/// How an episode stands, as its surroundings see it. What a method thinks of it is [`Status`].
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Phase {
-    /// On the way.
-    Running,
-    /// The robot truly is within the arrival radius, under [`StopRule::Reached`].
-    Reached,
-    /// The time limit has come.
-    OutOfTime,
-    /// The robot was told to move for some seconds and did not.
-    Stuck,
-}
 
 /// State of a running episode, for a watcher.
 #[derive(Debug, Clone, Copy)]
@@ -94,31 +73,6 @@ pub struct Simulation<'a> {
     sensor: Box<dyn Sensor + 'a>,
     recorder: Option<Box<dyn Recorder + 'a>>,
     episode: Option<Episode<'a>>,
-}
-
-/// The run that is under way.
-struct Episode<'a> {
-    seed: u64,
-    start: Pose,
-    plant: Box<dyn Plant + 'a>,
-    /// Control periods since the start, and the time that other intervals took, s.
-    ticks: usize,
-    other_s: f64,
-    phase: Phase,
-    /// What is sensed at this moment.
-    odometry: Odometry,
-    bearings: Vec<Bearing>,
-    compass_rad: Option<f64>,
-    slip_m_s: [f64; 2],
-    dead_reckoned: Pose,
-    /// All of the past, each row with the command that ended it.
-    steps: Vec<Step>,
-    collisions: Vec<Collision>,
-    /// How many of these there were before the last step.
-    known_collisions: usize,
-    start_picture: Option<Panorama>,
-    began: Instant,
-    timing: Timing,
 }
 
 impl<'a> Simulation<'a> {
@@ -509,63 +463,6 @@ impl<'a> Simulation<'a> {
 
 fn not_reset() -> Error {
     Error::Invalid { what: "simulation".into(), found: "no run under way".into(), allowed: "one that was reset".into() }
-}
-
-impl Episode<'_> {
-    fn time_s(&self, period_s: f64) -> f64 {
-        self.ticks as f64 * period_s + self.other_s
-    }
-
-    /// Moves for one interval.
-    fn step(&mut self, command: Twist, interval_s: Option<f64>, period_s: f64) {
-        let moving = Instant::now();
-        let moved = self.plant.step(command, interval_s.unwrap_or(period_s));
-        self.timing.physics_s += moving.elapsed().as_secs_f64();
-        match interval_s {
-            None => self.ticks += 1,
-            Some(interval_s) => self.other_s += interval_s,
-        }
-        self.odometry = moved.odometry;
-        self.slip_m_s = moved.slip_m_s;
-        self.known_collisions = self.collisions.len();
-        self.collisions.extend_from_slice(self.plant.collisions());
-        self.dead_reckoned = self.dead_reckoned.advanced(moved.odometry.twist, moved.odometry.dt_s);
-    }
-
-    /// A row that says where the plant is, without an observation or a command.
-    fn row(&self, period_s: f64) -> Step {
-        Step {
-            time_s: self.time_s(period_s),
-            truth: self.plant.truth(),
-            dead_reckoned: self.dead_reckoned,
-            odometry: self.odometry.twist,
-            slip_m_s: self.slip_m_s,
-            command: Twist::default(),
-            estimate: None,
-            seen: None,
-            matched: 0,
-            rejected: 0,
-            nis: f64::NAN,
-        }
-    }
-
-    /// What a recorder is told of a step.
-    fn moment<'m>(&'m self, step: &'m Step, bearings: &'m [Bearing], panorama: Option<&'m Panorama>) -> Moment<'m> {
-        let collisions = &self.collisions[self.known_collisions..];
-        Moment { step, bearings, panorama, bodies: self.plant.body_poses(), collisions }
-    }
-
-    /// Whether the robot was told to move during the whole window before now and did not.
-    fn is_stuck(&self, period_s: f64) -> bool {
-        let window = (STUCK_WINDOW_S / period_s).ceil() as usize;
-        let Some(first) = self.steps.len().checked_sub(window) else { return false };
-        let now = self.plant.truth();
-        self.steps[first..].iter().all(|s| {
-            (s.command.v.abs() >= IDLE_TWIST.v || s.command.omega.abs() >= IDLE_TWIST.omega)
-                && (s.truth.position() - now.position()).norm() < STUCK_DISTANCE_M
-                && wrap(s.truth.heading - now.heading).abs() < STUCK_TURN_RAD
-        })
-    }
 }
 
 #[cfg(test)]
