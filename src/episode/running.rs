@@ -18,12 +18,13 @@ const STUCK_TURN_RAD: f64 = 0.1;
 /// Commands below these count as not told to move, m/s and rad/s.
 const IDLE_TWIST: Twist = Twist { v: 0.005, omega: 0.02 };
 
-/// How an episode stands, as its surroundings see it. What a method thinks of it is [`Status`].
+/// How an episode stands, as its surroundings see it. What a method thinks of it is
+/// [`Status`](crate::observation::Status).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Phase {
     /// On the way.
     Running,
-    /// The robot truly is within the arrival radius, under [`StopRule::Reached`].
+    /// The robot truly is within the arrival radius, under [`StopRule::Reached`](super::StopRule::Reached).
     Reached,
     /// The time limit has come.
     OutOfTime,

@@ -457,8 +457,8 @@ mod tests {
         assert!(view.unevenness > EVEN && (view.share - 50.0 / 120.0).abs() < 1e-12, "{view:?}");
     }
 
-    /// Two readings of all views, by landmarks of the one and of the other half of the room: home here, and home 1 m to the left. Each has an
-    /// answer of its own, which leads where it explains more.
+    /// Two readings of all views, by landmarks of the one and of the other half of the room: home here, and home 1 m to the left.
+    /// Each has an answer of its own, which leads where it explains more.
     #[test]
     fn two_readings_of_a_view_are_two_answers() {
         let mut homes = Homes::new(FilterSettings::default(), &HomeSnapshot { bearings: see(&Pose::IDENTITY, |_| true) });

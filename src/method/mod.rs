@@ -1,7 +1,7 @@
 //! The homing methods: an estimator or a direct law, joined to a controller, behind the [`Method`] trait.
 //!
-//! Everything here sees a [`Briefing`] and [`Observation`](crate::observation::Observation)s only. The one number a person may add is the pose that the paper's
-//! filter is started from, because that filter cannot start from nothing.
+//! Everything here sees a [`Briefing`] and [`Observation`](crate::observation::Observation)s only. The one number a person may add is
+//! the pose that the paper's filter is started from, because that filter cannot start from nothing.
 //!
 //! Knows of: observations, estimators and control laws. Must not know of worlds, plants, sensors or any truth.
 

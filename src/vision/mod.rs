@@ -507,8 +507,8 @@ fn sd_rad(feature: &Feature, distance: f32, projection: &Projection, settings: &
     (settings.usual_misfit * sharp).sqrt() * projection.pixel_rad()
 }
 
-/// Standard deviation of a current azimuth once the match's misfit is known, and the median squared misfit of its reading. What it says of both azimuths is put on the current
-/// one: the home bearing is stated once and for all.
+/// Standard deviation of a current azimuth once the match's misfit is known, and the median squared misfit of its reading.
+/// What the misfit says of both azimuths is put on the current one: the home bearing is stated once and for all.
 fn given_misfit(home_sd_rad: f64, sd_rad: f64, chi2: f64, median: f64, settings: &ExtractorSettings) -> f64 {
     let (share, gain) = settings.variance_by_misfit;
     let (home, now) = (home_sd_rad * home_sd_rad, sd_rad * sd_rad);
