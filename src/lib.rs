@@ -66,7 +66,7 @@
 //! ```text
 //! 8  the command line (src/cli, main.rs)
 //! 7  report -> study          pages of finished work         verify   the project held against others
-//! 6  study -> record          many episodes
+//! 6  study -> record          many episodes                          route    chains of snapshots, taught and followed
 //! 5  record -> episode        one recorder a format          episode  a simulation that is stepped
 //! 4  sensor   method   dataset
 //! 3  physics   render   vision   estimation   control        draw     charts, maps, sheets
@@ -116,6 +116,7 @@ pub mod random;
 pub mod record;
 pub mod render;
 pub mod report;
+pub mod route;
 pub mod sensor;
 pub mod statistics;
 pub mod storage;

@@ -19,6 +19,7 @@ mod observability;
 mod render;
 mod reproduce;
 mod robustness;
+mod route;
 mod setup;
 mod sweep;
 mod threads;
@@ -81,6 +82,8 @@ enum Command {
     Sweep(Box<sweep::SweepArgs>),
     /// Cramer-Rao bound of range, bearing and heading along a path, and the filter's errors beside it
     Bound(bound::BoundArgs),
+    /// Teach a chain of snapshots along a way, and follow it by visual homing
+    Route(route::RouteArgs),
     /// Render panoramas with range and instance ids: of a pose, along a trajectory, or several on a sheet
     Render(Box<render::RenderArgs>),
     /// Panorama sets with ground truth in the field's layouts, and their check
@@ -115,6 +118,7 @@ pub fn run() -> Result<Verdict> {
         Command::RenderReport(args) => verify::render(&args, context),
         Command::Reproduce(args) => reproduce::run(&args, context),
         Command::Robustness(args) => robustness::run(&args, context),
+        Command::Route(args) => route::run(&args, context),
         Command::Sweep(args) => sweep::run(&args, context),
         Command::Verify(args) => verify::run(&args, context),
         Command::VisionReport(args) => verify::vision(&args, context),

@@ -11,6 +11,7 @@ mod curves;
 pub mod dataset;
 pub mod paper;
 pub mod robustness;
+pub mod route;
 pub mod seeds;
 pub mod sweep;
 pub mod text;

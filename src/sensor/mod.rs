@@ -7,6 +7,7 @@
 //!
 //! Knows of: the true world, the renderer, the extractor and panorama sets. Must not know of methods.
 
+mod camera;
 mod compass;
 mod dataset;
 mod degraded;
@@ -15,6 +16,7 @@ mod noisy;
 mod rendered;
 mod sight;
 
+pub use camera::CameraSensor;
 pub use compass::CompassSensor;
 pub use dataset::{DatasetChoice, DatasetField, DatasetSensor};
 pub use degraded::{Degradation, DegradedSensor};

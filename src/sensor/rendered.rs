@@ -47,9 +47,6 @@ pub struct RenderedSensor<'a> {
     /// Frames taken since home.
     frame: u64,
     last: Option<Pose>,
-    period_s: f64,
-    /// Speeds above which the robot was carried.
-    carried: Twist,
     timing: SensorTiming,
 }
 
@@ -63,7 +60,6 @@ impl<'a> RenderedSensor<'a> {
         projection: Projection,
         settings: ExtractorSettings,
     ) -> Self {
-        let robot = &world.spec.robot;
         Self {
             world,
             renderer,
@@ -78,23 +74,12 @@ impl<'a> RenderedSensor<'a> {
             seed: Seed(0),
             frame: 0,
             last: None,
-            period_s: world.spec.task.control_period_s,
-            carried: Twist { v: CARRIED * robot.max_speed_m_s, omega: CARRIED * robot.max_turn_rate_rad_s },
             timing: SensorTiming::default(),
         }
     }
 
-    /// How the robot has moved since the last observation.
-    fn twist(&self, truth: &Pose) -> Twist {
-        let Some(last) = self.last else { return Twist::default() };
-        let turned = wrap(truth.heading - last.heading);
-        let along = direction(last.heading + 0.5 * turned).dot(&(truth.position() - last.position()));
-        let twist = Twist { v: along / self.period_s, omega: turned / self.period_s };
-        if twist.v.abs() > self.carried.v || twist.omega.abs() > self.carried.omega { Twist::default() } else { twist }
-    }
-
     fn take(&mut self, truth: Pose, bodies: &[Pose]) -> Result<()> {
-        let twist = self.twist(&truth);
+        let twist = self.last.map_or_else(Twist::default, |last| twist_between(self.world, &last, &truth));
         let noise = self.seed.derive(&format!("frame {}", self.frame));
         self.frame += 1;
         self.last = Some(truth);
@@ -108,6 +93,16 @@ impl<'a> RenderedSensor<'a> {
             result => result,
         }
     }
+}
+
+/// How a robot moved that was at `last` a control period ago and is at `truth` now; not at all if it was carried.
+pub(super) fn twist_between(world: &World, last: &Pose, truth: &Pose) -> Twist {
+    let (robot, period_s) = (&world.spec.robot, world.spec.task.control_period_s);
+    let turned = wrap(truth.heading - last.heading);
+    let along = direction(last.heading + 0.5 * turned).dot(&(truth.position() - last.position()));
+    let twist = Twist { v: along / period_s, omega: turned / period_s };
+    let carried = twist.v.abs() > CARRIED * robot.max_speed_m_s || twist.omega.abs() > CARRIED * robot.max_turn_rate_rad_s;
+    if carried { Twist::default() } else { twist }
 }
 
 impl Sensor for RenderedSensor<'_> {

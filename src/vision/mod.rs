@@ -19,6 +19,7 @@ mod matching;
 mod motion;
 mod objects;
 mod pyramid;
+pub mod view;
 
 use std::cmp::Reverse;
 use std::collections::BTreeSet;

@@ -29,7 +29,7 @@ const BUILTIN_SOURCE: &str = "builtin:";
 /// Marks the source of a world that was generated when it was opened.
 const GENERATED_SOURCE: &str = "generated:";
 /// The worlds that the program carries with it, as (name, TOML text).
-const BUILTIN: [(&str, &str); 8] = [
+const BUILTIN: [(&str, &str); 10] = [
     ("lab", include_str!("../../worlds/lab.toml")),
     ("slippery", include_str!("../../worlds/slippery.toml")),
     ("crowd", include_str!("../../worlds/crowd.toml")),
@@ -38,6 +38,8 @@ const BUILTIN: [(&str, &str); 8] = [
     ("proving-ground", include_str!("../../worlds/proving-ground.toml")),
     ("vardy-hall", include_str!("../../worlds/vardy-hall.toml")),
     ("gallery", include_str!("../../worlds/gallery.toml")),
+    ("office-floor", include_str!("../../worlds/office-floor.toml")),
+    ("loop-hall", include_str!("../../worlds/loop-hall.toml")),
 ];
 /// The images of those worlds, by their path.
 const BUILTIN_IMAGES: [(&str, &[u8]); 2] = [
