@@ -91,7 +91,7 @@ impl Shapes {
     /// What the upright plane through the camera at `azimuth` cuts: bodies as boxes of near, far, bottom and top, and the wall
     /// behind them.
     fn cut(&self, camera: Vector2<f64>, azimuth: f64) -> (Vec<([f32; 4], u16)>, f32, u16) {
-        const REACH: f32 = 30.0;
+        const REACH: f32 = 70.0;
         let d = direction(azimuth);
         let (origin, d) = (Vector::new(camera.x as f32, camera.y as f32), Vector::new(d.x as f32, d.y as f32));
         let (ray, back) = (Ray::new(origin, d), Ray::new(origin + d * REACH, -d));

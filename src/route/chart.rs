@@ -42,8 +42,6 @@ pub struct RouteSheet {
     pub camera_offset_m: [f64; 2],
     /// When snapshots were taken.
     pub rule: SnapshotRule,
-    /// Whether the last snapshot was taken where the first was, so that the route may be repeated round and round.
-    pub is_loop: bool,
 }
 
 /// A taught route.
@@ -136,7 +134,7 @@ impl Line {
         turns.into_iter().map(|(s, _)| s).collect()
     }
 
-    /// The stretch around a place on which the line does not turn back on itself. Within [`PASSED_M`] of a turn ahead it is the next one.
+    /// The stretch around a place on which the line does not turn back on itself. Two centimetres before a turn it is the next one.
     #[must_use]
     pub fn stretch(&self, along_m: f64) -> (f64, f64) {
         let k = self.turns.partition_point(|turn| *turn <= along_m + PASSED_M);

@@ -201,7 +201,6 @@ impl Learner {
             projection,
             camera_offset_m,
             rule: self.rule,
-            is_loop: false,
         };
         Route { sheet, path: self.path, snapshots: self.snapshots }
     }

@@ -266,3 +266,76 @@ fn of_outline(bits: u128) -> [u8; 128] {
     let [high, low] = [LEVELS.0, LEVELS.1].map(|level| (LEVELS.2 * level / norm).round().min(255.0) as u8);
     std::array::from_fn(|k| if bits >> k & 1 == 1 { high } else { low })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::panorama::Projection;
+    use crate::route::rule::SnapshotRule;
+
+    fn route() -> Route {
+        let feature = |k: u32| KeptFeature {
+            track: k,
+            feature: ViewFeature {
+                azimuth_rad: wrap(0.7 * f64::from(k)),
+                tan: 0.1 * f64::from(k) - 0.4,
+                scale_rad: 0.01 * f64::from(k + 1),
+                looseness: 1.3,
+                is_bright: k.is_multiple_of(2),
+                strength: 0.0,
+                descriptor: std::array::from_fn(|i| (37 * i as u32 + 11 * k) as u8),
+            },
+        };
+        let sheet = RouteSheet {
+            world: "lab".into(),
+            world_sha256: "0".repeat(64),
+            projection: Projection::new(720, 90),
+            camera_offset_m: [0.05, 0.0],
+            rule: SnapshotRule::Waypoints,
+        };
+        let path = (0..40).map(|k| Pose::new(0.1 * f64::from(k), 0.02 * f64::from(k), 0.1 * f64::from(k))).collect();
+        let snapshot = |node| Snapshot { node, features: (0..9).map(feature).collect() };
+        Route { sheet, path, snapshots: vec![snapshot(0), snapshot(39)] }
+    }
+
+    /// What is read back is what was kept, to the rounding of the format, which does not add up along the path; and is kept again as the
+    /// same bytes.
+    #[test]
+    fn a_route_comes_back() {
+        let route = route();
+        let mut store = MemoryStore::default();
+        store.keep(&route).unwrap();
+        let back = store.recall().unwrap();
+        assert_eq!((&back.sheet, back.snapshots.len(), back.path.len()), (&route.sheet, 2, 40));
+        for (a, b) in route.path.iter().zip(&back.path) {
+            assert!((a.position() - b.position()).norm() < 5e-4 && wrap(a.heading - b.heading).abs() < 1e-4);
+        }
+        let (a, b) = (&route.snapshots[1].features[7], &back.snapshots[1].features[7]);
+        assert!(
+            wrap(a.feature.azimuth_rad - b.feature.azimuth_rad).abs() < 5e-5 && (a.feature.tan - b.feature.tan).abs() < 1e-4
+        );
+        assert!((a.feature.scale_rad / b.feature.scale_rad - 1.0).abs() < 0.02 && a.track == b.track);
+        assert_eq!(a.feature.descriptor, b.feature.descriptor);
+        assert_eq!(to_bytes(&back, Form::Full), to_bytes(&route, Form::Full));
+        assert!(to_bytes(&route, Form::Small).len() < to_bytes(&route, Form::Full).len() / 2);
+    }
+
+    #[test]
+    fn a_file_of_another_version_cut_or_changed_is_named() {
+        let bytes = to_bytes(&route(), Form::Full);
+        let told = |bytes: &[u8]| from_bytes(bytes, Path::new("r.bin")).unwrap_err().to_string();
+        assert!(told(b"seed,outcome\n1,home\n").contains("expected a route"));
+        let text = String::from_utf8_lossy(&bytes[..16]).into_owned();
+        assert_eq!(text, format!("{HEAD}{VERSION}\n"));
+        let mut older = bytes.clone();
+        older[14] = b'1';
+        assert!(told(&older).contains("found version 1"), "{}", told(&older));
+        for length in [20, 300, bytes.len() - 40, bytes.len() - 1] {
+            assert!(told(&bytes[..length]).contains("cut off"), "{length}: {}", told(&bytes[..length]));
+        }
+        let mut changed = bytes.clone();
+        let middle = changed.len() / 2;
+        changed[middle] ^= 4;
+        assert!(told(&changed).contains("changed"), "{}", told(&changed));
+    }
+}

@@ -160,3 +160,31 @@ pub fn tour(world: &World, seed: u64, length_m: f64) -> Result<Vec<Vector2<f64>>
     }
     Ok(points.into_iter().map(|k| cells.middle(k)).collect())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_tour_can_be_driven_and_is_the_same_again() {
+        let world = World::open("flat:3").unwrap();
+        let points = tour(&world, 1, 20.0).unwrap();
+        let (line, along) = crate::route::teach::way(&world, &points).unwrap();
+        assert!((18.0..45.0).contains(&line.length_m()), "{}", line.length_m());
+        assert!(along.is_sorted() && along.len() == points.len());
+        assert_eq!(points, tour(&world, 1, 20.0).unwrap());
+        assert_ne!(points, tour(&world, 2, 20.0).unwrap());
+    }
+
+    #[test]
+    fn ways_that_cannot_be_driven_are_named() {
+        let world = World::open("lab").unwrap();
+        let told = |points: &[(f64, f64)]| {
+            let points: Vec<Vector2<f64>> = points.iter().map(|(x, y)| Vector2::new(*x, *y)).collect();
+            crate::route::teach::way(&world, &points).unwrap_err().to_string()
+        };
+        assert!(told(&[(1.5, 1.2)]).contains("at least 2"));
+        assert!(told(&[(1.5, 1.2), (1.5, 1.21), (3.0, 1.4)]).contains("numbers 1 and 2"));
+        assert!(told(&[(3.4, 3.0), (3.4, 9.0)]).contains("in the way from"));
+    }
+}
