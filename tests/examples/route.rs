@@ -22,12 +22,12 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut store = FileStore { path: folder.path().join("route.bin"), form: Form::Full };
     let bytes = store.keep(&lesson.route)?;
     let route = store.recall()?;
-    println!("{:.1} m, {} snapshots, {bytes} bytes", route.length_m(), route.snapshots.len());
+    eprintln!("{:.1} m, {} snapshots, {bytes} bytes", route.length_m(), route.snapshots.len());
     let night = Look { light: Some(LightPreset::Night), ..Look::default() };
     let back = Repeating { way: Way::Backwards, ..Repeating::default() };
     for (name, repeating) in [("by night", Repeating { look: night, ..Repeating::default() }), ("backwards", back)] {
         let row = RepeatRow::new(&repeat(&stage, &route, &lesson.truth, &repeating, 7, &mut |_| ControlFlow::Continue(()))?);
-        println!("{name}: {}, {:.1} cm from the taught path", row.outcome, 100.0 * row.cross_track_mean_m.unwrap_or(f64::NAN));
+        eprintln!("{name}: {}, {:.1} cm from the taught path", row.outcome, 100.0 * row.cross_track_mean_m.unwrap_or(f64::NAN));
         assert!(row.completed, "{row:?}");
     }
     Ok(())
