@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on says so by panicking")]
 
-use wayhome::geometry::{Pose, Vector2};
+use wayhome::geometry::Vector2;
 use wayhome::random::Seed;
 use wayhome::world::generate::{Drawn, Generated, Kind, Knob, Knobs, Outline, generate};
 use wayhome::world::spec::MotionSpec;
@@ -54,21 +54,79 @@ fn flooded(world: &World) -> Vec<Vector2<f64>> {
     reached.into_iter().map(at).collect()
 }
 
-#[test]
-fn home_is_reached_from_all_starts() {
-    for kind in Kind::rooms() {
-        for seed in 500..503 {
-            let world = loaded(&made(kind, seed, &["walkers=0"]));
-            let places = flooded(&world);
-            let named = world.spec.start.named.iter().map(|n| Pose::new(n.x_m, n.y_m, 0.0));
-            let mut stream = Seed(seed).stream("start");
-            let drawn: Vec<Pose> = (0..10).map(|_| world.random_start(&mut stream).unwrap()).collect();
-            for start in named.chain(drawn) {
-                let near = places.iter().filter(|p| (*p - start.position()).norm() < 0.15);
-                let reached = near.clone().any(|p| world.is_corridor_free(start.position(), *p).is_ok());
-                assert!(reached, "{kind} {seed}: no way from {start:?}");
+/// Whether the robot drives through all doors of inner walls, from home and out again on the other side.
+fn doors_are_passed(world: &World) -> Result<(), String> {
+    if world.spec.walls.iter().all(|wall| wall.openings.is_empty()) {
+        return Ok(());
+    }
+    let places = flooded(world);
+    for wall in &world.spec.walls {
+        let [from, to] = [wall.from_m, wall.to_m].map(|[x, y]| Vector2::new(x, y));
+        let along = (to - from) / (to - from).norm();
+        let left = Vector2::new(-along.y, along.x);
+        for door in &wall.openings {
+            let middle = from + along * (door.from_start_m + 0.5 * door.width_m);
+            for side in [-1.0, 1.0] {
+                let beyond = |p: &&Vector2<f64>| (0.05..0.6).contains(&(*p - middle).dot(&(left * side)));
+                let mut near = places.iter().filter(beyond).filter(|p| (*p - middle).norm() < 0.6);
+                if !near.any(|p| world.is_corridor_free(*p, middle).is_ok()) {
+                    return Err(format!("no way to the door of {} on side {side}", wall.name));
+                }
             }
         }
+    }
+    Ok(())
+}
+
+/// What a world holds by the checks of a file, not by those of the generator.
+fn check_ways(kind: Kind, seed: u64, settings: &[&str]) {
+    let world = loaded(&made(kind, seed, settings));
+    assert_eq!(world.unreachable_starts(), [], "{kind} {seed} {settings:?}");
+    let mut stream = Seed(seed).stream("start");
+    for _ in 0..3 {
+        let start = world.random_start(&mut stream).unwrap();
+        assert!(world.is_corridor_free(start.position(), world.home.position()).is_ok());
+    }
+    assert_eq!(doors_are_passed(&world), Ok(()), "{kind} {seed} {settings:?}");
+}
+
+#[test]
+fn home_is_reached_from_all_starts_and_through_all_doors() {
+    for &kind in Kind::ALL {
+        for seed in 500..if kind == Kind::Flat { 540 } else { 512 } {
+            check_ways(kind, seed, &[]);
+        }
+    }
+}
+
+/// At both ends of what each knob allows: where no drawing serves, the kind says so, and what is made is sound.
+#[test]
+fn extreme_knobs_make_sound_worlds_or_none() {
+    for kind in Kind::rooms() {
+        let mut refused = Vec::new();
+        let mut sets: Vec<Vec<String>> = Vec::new();
+        for knob in Knob::ALL {
+            let ends = knob.ranges(kind).map(|r| r.allowed);
+            sets.extend(ends.into_iter().flatten().map(|end| vec![format!("{}={end}", knob.name())]));
+        }
+        sets.push(["clutter=1", "walkers=20", "zones=12", "camera_height_m=1.8"].map(str::to_owned).into());
+        for set in &sets {
+            let settings: Vec<&str> = set.iter().map(String::as_str).collect();
+            let mut knobs = Knobs::default();
+            settings.iter().for_each(|s| knobs.set(s).unwrap());
+            match generate(kind, 77, &knobs) {
+                // A hall of 80 m is like one of 20 and takes long to look through.
+                Ok(_) if settings[0].starts_with("length_m") || settings[0].starts_with("width_m") => {
+                    loaded(&made(kind, 77, &settings));
+                }
+                Ok(_) => check_ways(kind, 77, &settings),
+                Err(fault) => {
+                    assert!(fault.to_string().contains("no place for home that the robot reaches"), "{fault}");
+                    refused.push(settings.join(" "));
+                }
+            }
+        }
+        assert!(10 * refused.len() <= sets.len(), "{kind}: none with {refused:?}");
     }
 }
 

@@ -7,12 +7,14 @@ use super::furniture;
 use super::knobs::{Drawn, Knob};
 use super::looks::Looks;
 use super::plan::Plan;
-use super::reach::Grid;
+use super::reach::{CELL_M, Grid};
 use crate::geometry::{Vector2, angle_of, direction};
 use crate::world::convex::Convex;
 use crate::world::polygon::{contains_segment, distance_to_segment, edges};
 use crate::world::robot::RobotSpec;
-use crate::world::spec::{BodySpec, MotionSpec, NamedStartSpec, PoseSpec, ShapeSpec, StartSpec, ZoneSpec};
+use crate::world::spec::{
+    BodySpec, MotionSpec, NamedStartSpec, OpeningKind, PoseSpec, ShapeSpec, StartSpec, WallSpec, ZoneSpec,
+};
 
 /// Least distance from home of a random start, m.
 const NEAREST_START_M: f64 = 0.8;
@@ -36,6 +38,9 @@ pub(super) fn choose(plan: &Plan, drawn: &Drawn, robot: &RobotSpec, dice: &mut D
     let grid = Grid::new(plan, robot.radius_m, robot.height_m);
     let free: Vec<usize> = (0..grid.cells()).filter(|&c| grid.is_free(c)).collect();
     let reached = largest_component(&grid, &free, dice)?;
+    if !plan.walls.iter().all(|wall| doors_are_passed(&grid, &reached, wall)) {
+        return None;
+    }
     let (low, high) = plan.bounds();
     let farthest_m = drawn.get(Knob::StartDistanceM).min(0.55 * (high - low).norm());
     // Most docking stations stand at a wall; a home in the open is as far from everything as the room allows.
@@ -65,6 +70,23 @@ fn largest_component(grid: &Grid, free: &[usize], dice: &mut Dice) -> Option<Vec
     (0..8).map(|_| grid.component(*dice.pick(free))).find(|reached| {
         let count = reached.iter().filter(|r| **r).count();
         10 * count >= 9 * free.len()
+    })
+}
+
+/// Whether the robot, from wherever it can be, drives through all doors of a wall and out again on the other side.
+fn doors_are_passed(grid: &Grid, reached: &[bool], wall: &WallSpec) -> bool {
+    /// How far from the line of its wall a place is beyond a door, m.
+    const BEYOND_M: f64 = 0.35;
+    let [from, to] = [wall.from_m, wall.to_m].map(|[x, y]| Vector2::new(x, y));
+    let along = (to - from) / wall.length_m();
+    let left = Vector2::new(-along.y, along.x);
+    wall.openings.iter().filter(|o| o.kind == Some(OpeningKind::Door)).all(|door| {
+        let steps = (door.width_m / (0.5 * CELL_M)).floor().max(1.0);
+        let mut places = (0..=steps as usize).map(|k| from + along * (door.from_start_m + door.width_m * (k as f64 / steps)));
+        places.any(|at| {
+            let [right, left] = [-1.0, 1.0].map(|side| at + left * (side * BEYOND_M));
+            grid.cell(right).is_some_and(|cell| reached[cell]) && grid.sees(right, left)
+        })
     })
 }
 
@@ -210,4 +232,36 @@ pub(super) fn zones(plan: &Plan, drawn: &Drawn, dice: &mut Dice) -> Vec<ZoneSpec
         }
     }
     zones
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::world::generate::plan::Solid;
+    use crate::world::spec::OpeningSpec;
+
+    /// Two rooms with a door between them, which is passed until something stands before it, though both rooms stay in reach by
+    /// another door.
+    #[test]
+    fn a_door_with_something_before_it_is_not_passed() {
+        let door = |from_start_m: f64| OpeningSpec {
+            kind: Some(OpeningKind::Door),
+            from_start_m,
+            width_m: 0.8,
+            sill_m: None,
+            top_m: Some(2.0),
+        };
+        let mut plan = Plan::new(&[[0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [0.0, 4.0]], 2.5);
+        plan.wall(WallSpec { openings: vec![door(0.3), door(2.5)], ..WallSpec::new([2.0, 0.0], [2.0, 4.0]) });
+        let passed = |plan: &Plan| {
+            let grid = Grid::new(plan, 0.164, 0.35);
+            let reached = grid.component(grid.cell(Vector2::new(1.0, 2.0)).unwrap());
+            assert!(reached[grid.cell(Vector2::new(3.0, 2.0)).unwrap()]);
+            doors_are_passed(&grid, &reached, &plan.walls[0])
+        };
+        assert!(passed(&plan));
+        let shape = ShapeSpec::Box { size_m: [0.4, 0.7] };
+        plan.solids.push(Solid::new(&shape, crate::geometry::Pose::new(2.4, 2.9, 0.0), 0.0, 1.0));
+        assert!(!passed(&plan));
+    }
 }

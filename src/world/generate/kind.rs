@@ -71,7 +71,7 @@ pub(super) fn words(documentation: Option<&'static str>) -> &'static str {
 }
 
 /// ` (did you mean NAME?)` where one of the names is near what was typed, else nothing.
-pub(super) fn did_you_mean<'a>(typed: &str, names: impl Iterator<Item = &'a str>) -> String {
+pub(in crate::world) fn did_you_mean<'a>(typed: &str, names: impl Iterator<Item = &'a str>) -> String {
     /// As similar as this, by Jaro and Winkler's measure, is near.
     const NEAR: f64 = 0.8;
     let similar = names.map(|name| (strsim::jaro_winkler(typed, name), name));

@@ -35,6 +35,7 @@ mod reach;
 pub(in crate::world) mod room;
 
 pub use kind::Kind;
+pub(in crate::world) use kind::did_you_mean;
 pub use knobs::{Drawn, Knob, Knobs, OUTLINE, Ranges, usual_outlines};
 pub use outline::Outline;
 
