@@ -264,11 +264,48 @@ fn a_period_shorter_than_its_wall_is_warned_of() {
     let texture = "to_m = [2.2, 3.0]\ntexture = { family = \"tiles\", period_m = 0.3 }";
     let [(place, ..)] = &warned("to_m = [2.2, 3.0]", texture)[..] else { panic!("the stub") };
     assert_eq!(place, "walls[0].texture.period_m");
+    let [(place, _, message)] = &warned("[room]", "[room]\nfloor = { family = \"tiles\", period_m = 3.0 }")[..] else {
+        panic!("the floor")
+    };
+    assert!(place == "room.floor.period_m" && message.starts_with("the floor, 4.00 m long"), "{place}: {message}");
     assert_eq!(
         warned("family = \"brick\", contrast = 0.5", "family = \"bands\", period_m = 1.0"),
         [],
         "the same everywhere anyway"
     );
+}
+
+/// A floor or ceiling without a period looks the same in no two places, however long the room; those of built-in worlds give theirs.
+#[test]
+fn floors_do_not_repeat_unless_they_are_told_to() {
+    let long = "name = \"long\"\nhome = { x_m = 1, y_m = 1 }\n[room]\noutline_m = [[0, 0], [14, 0], [14, 3], [0, 3]]\n\
+                ceiling = { family = \"tiles\" }\n";
+    let world = World::from_toml(long, "long.toml").expect("sound");
+    assert_eq!([world.floor_texture.period_m[0], world.ceiling_texture.period_m[0]], [14.0, 14.0]);
+    assert_eq!(world.warnings, []);
+    for name in World::builtin_names() {
+        let world = World::open(name).expect(name);
+        for (texture, spec) in
+            [(&world.floor_texture, &world.spec.room.floor), (&world.ceiling_texture, &world.spec.room.ceiling)]
+        {
+            assert!(!texture.fitted && texture.period_m[0] == spec.period_m.unwrap_or(4.0), "{name}: its pictures stay");
+        }
+    }
+}
+
+#[test]
+fn a_world_that_is_none_is_told_with_what_there_is() {
+    let told = |argument: &str| World::open(argument).expect_err(argument).to_string();
+    for (argument, words) in [
+        ("bathroom:3", &["found bathroom", "lab, office, flat"][..]),
+        ("ofice:3", &["did you mean office?"]),
+        ("office:x", &["found x", "office:17"]),
+        ("slipery", &["did you mean slippery?", "kinds: lab, office", "crowd"]),
+    ] {
+        for word in words {
+            assert!(told(argument).contains(word), "{argument}: {}", told(argument));
+        }
+    }
 }
 
 #[test]

@@ -6,10 +6,10 @@ use std::sync::LazyLock;
 use serde::Deserialize;
 use sha2::{Digest, Sha256};
 
-use super::generate::{Kind, Knobs, generate};
+use super::generate::{Kind, Knobs, did_you_mean, generate};
 use super::grid::Grid;
 use super::picture::{Gallery, Pictures};
-use super::polygon::{anticlockwise, signed_area};
+use super::polygon::{anticlockwise, bounds, signed_area};
 use super::repeats;
 use super::robot::{RobotPreset, RobotSpec};
 use super::spec::{BodySpec, CameraPreset, RoomSpec, ShapeSpec, WallSpec, WindowSpec, WorldSpec};
@@ -223,11 +223,13 @@ impl World {
         let partitions = partitions.collect();
         let zones =
             spec.floor.zones.iter().map(|z| Zone { polygon: anticlockwise(&z.polygon_m), friction: z.friction }).collect();
+        let (low, high) = bounds(&outline);
+        let longest_m = (high.x - low.x).max(high.y - low.y);
         let home = Pose::new(spec.home.x_m, spec.home.y_m, spec.home.heading_deg.to_radians());
         let mut world = Self {
             wall_textures,
-            floor_texture: Texture::new(&spec.room.floor, 0.0, seed(1), pictures),
-            ceiling_texture: Texture::new(&spec.room.ceiling, 0.0, seed(2), pictures),
+            floor_texture: Texture::new(&spec.room.floor, longest_m, seed(1), pictures),
+            ceiling_texture: Texture::new(&spec.room.ceiling, longest_m, seed(2), pictures),
             landmark_count: spec.landmarks.len(),
             outline,
             bodies,
@@ -258,11 +260,15 @@ pub(super) fn read(argument: &str) -> Result<(String, PathBuf)> {
     if path.is_file() {
         return Ok((read_file(path)?, path.to_owned()));
     }
-    if let Some((kind, seed)) = argument.split_once(':')
-        && let (Ok(kind), Ok(seed)) = (kind.parse::<Kind>(), seed.parse())
-    {
+    if let Some((kind, seed)) = argument.split_once(':').filter(|_| !argument.contains(['/', '\\'])) {
+        let kind: Kind = kind.parse()?;
+        let seed = seed.trim().parse().map_err(|_| Error::Invalid {
+            what: format!("seed of a world of kind {kind}"),
+            found: if seed.is_empty() { "none".to_owned() } else { seed.to_owned() },
+            allowed: format!("one of 0 to {}, as in {kind}:17", u64::MAX),
+        })?;
         let world = generate(kind, seed, &Knobs::default())?;
-        return Ok((world.toml, PathBuf::from(format!("{GENERATED_SOURCE}{argument}"))));
+        return Ok((world.toml, PathBuf::from(format!("{GENERATED_SOURCE}{kind}:{seed}"))));
     }
     let bare = argument.strip_prefix("worlds/").unwrap_or(argument);
     let bare = bare.strip_suffix(".toml").unwrap_or(bare);
@@ -270,9 +276,10 @@ pub(super) fn read(argument: &str) -> Result<(String, PathBuf)> {
         Some((name, text)) => Ok(((*text).to_owned(), PathBuf::from(format!("{BUILTIN_SOURCE}{name}")))),
         None => Err(Error::Invalid {
             what: "world".to_owned(),
-            found: format!("{argument}, which is no file"),
+            found: format!("{argument}{}, which is no file", did_you_mean(bare, World::builtin_names().into_iter())),
             allowed: format!(
-                "a world file (TOML or JSON), a generated world as KIND:SEED (office:17), or a built-in world: {}",
+                "a world file (TOML or JSON), a generated world as KIND:SEED (office:17; kinds: {}), or a built-in world: {}",
+                Kind::ALL.iter().map(|k| k.name()).collect::<Vec<_>>().join(", "),
                 World::builtin_names().join(", ")
             ),
         }),

@@ -1,9 +1,9 @@
-//! Walls that look the same in several places, because their pattern repeats along them.
+//! Walls, floors and ceilings that look the same in several places, because their pattern repeats along them.
 //!
 //! A robot that sees one of those places cannot tell which. A person who gives a period may want just that; one who does not know
 //! of it is told.
 
-use super::polygon::edges;
+use super::polygon::{bounds, edges};
 use super::{Footprint, Texture, World};
 use crate::fault::Warning;
 
@@ -22,6 +22,14 @@ pub(super) fn warnings(world: &World) -> Vec<Warning> {
             let place = place(&format!("room.walls[{k}]"), texture.period_m.is_some());
             note(&mut found, place, &world.wall_textures[wall(w)], &format!("wall {w}"), length_m);
         }
+    }
+    let (low, high) = bounds(&world.outline);
+    let longest_m = (high.x - low.x).max(high.y - low.y);
+    for (name, given, texture) in
+        [("floor", &spec.room.floor, &world.floor_texture), ("ceiling", &spec.room.ceiling, &world.ceiling_texture)]
+    {
+        let place = place(&format!("room.{name}"), given.period_m.is_some());
+        note(&mut found, place, texture, &format!("the {name}"), longest_m);
     }
     for (k, (wall, partition)) in spec.walls.iter().zip(&world.partitions).enumerate() {
         let place = match &wall.texture {

@@ -45,7 +45,7 @@ pub struct TextureSpec {
     #[serde(default = "TextureSpec::default_colour")]
     pub colour: [u8; 3],
     /// Width of surface after which it repeats, m. A pattern is as high as wide, an image as its sides ask. By default an image is
-    /// 4 m wide, a pattern on a floor or ceiling repeats after 4 m, and one on a wall or body not at all.
+    /// 4 m wide, and a pattern does not repeat.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub period_m: Option<f64>,
     /// Strength of the pattern, 0 (plain) to 1; by default 0.6 of a pattern, 1 of an image.
