@@ -4,7 +4,7 @@ use std::fs;
 use std::io::{Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
-use image::{DynamicImage, ImageReader, Limits};
+use image::{DynamicImage, ImageDecoder, ImageReader, Limits};
 
 use crate::error::{Error, Result};
 use crate::panorama::{Panorama, Projection};
@@ -71,7 +71,8 @@ impl Source {
         }
     }
 
-    fn decode(&self, root: &Path) -> Result<DynamicImage> {
+    /// The picture, the right way up.
+    pub(super) fn decode(&self, root: &Path) -> Result<DynamicImage> {
         let bytes = match self {
             Self::File(path) => read_within(root, path)?,
             Self::Member { archive, offset, bytes, .. } => {
@@ -97,7 +98,12 @@ impl Source {
         let mut limits = Limits::default();
         limits.max_alloc = Some(16 * MOST_PIXELS); // up to 16 bits a channel, and as much again while it is decoded
         reader.limits(limits);
-        reader.decode().map_err(broken)
+        // A camera that was held on its side says so, and nothing else does.
+        let mut decoder = reader.into_decoder().map_err(broken)?;
+        let orientation = decoder.orientation().map_err(broken)?;
+        let mut image = DynamicImage::from_decoder(decoder).map_err(broken)?;
+        image.apply_orientation(orientation);
+        Ok(image)
     }
 }
 

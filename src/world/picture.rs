@@ -9,7 +9,7 @@ use std::io::Cursor;
 use std::path::{Component, Path, PathBuf};
 use std::sync::Arc;
 
-use image::{ImageReader, Limits};
+use image::{DynamicImage, ImageDecoder, ImageReader, Limits};
 
 /// Largest file, bytes.
 pub(super) const MOST_BYTES: u64 = 64 << 20;
@@ -127,7 +127,12 @@ pub(super) fn decode(bytes: &[u8]) -> Result<Picture, Refusal> {
         let allowed = format!("1 to {LONGEST_PX} pixels a side, {MOST_PX} in all");
         return Err((format!("which is {width} x {height} pixels"), allowed));
     }
-    let rgba = reader()?.decode().map_err(|e| damaged(&e))?.to_rgba8();
+    let mut decoder = reader()?.into_decoder().map_err(|e| damaged(&e))?;
+    // A camera that was held on its side says so in its EXIF data.
+    let orientation = decoder.orientation().map_err(|e| damaged(&e))?;
+    let mut image = DynamicImage::from_decoder(decoder).map_err(|e| damaged(&e))?;
+    image.apply_orientation(orientation);
+    let rgba = image.to_rgba8();
     Ok(Picture { width: rgba.width(), height: rgba.height(), rgba: rgba.into_raw() })
 }
 
@@ -175,6 +180,33 @@ mod tests {
         ] {
             assert!(refusal(bytes).contains("cannot be decoded") || refusal(bytes).contains("0 x 0"), "{}", refusal(bytes));
         }
+    }
+
+    /// A JPEG of 16 x 8 pixels, left half dark and right half light, with this EXIF orientation.
+    fn jpeg(orientation: u8) -> Vec<u8> {
+        let pixels: Vec<u8> = (0..8 * 16).map(|k| if k % 16 < 8 { 0 } else { 255 }).collect();
+        let mut bytes = Vec::new();
+        let encoder = image::codecs::jpeg::JpegEncoder::new_with_quality(&mut bytes, 100);
+        image::ImageEncoder::write_image(encoder, &pixels, 16, 8, image::ExtendedColorType::L8).unwrap();
+        // One entry of a TIFF directory: tag 0x0112, a short.
+        let mut exif = b"Exif\0\0II*\0\x08\0\0\0\x01\0\x12\x01\x03\0\x01\0\0\0".to_vec();
+        exif.extend([orientation, 0, 0, 0, 0, 0, 0, 0]);
+        let mut segment = vec![0xff, 0xe1];
+        segment.extend((exif.len() as u16 + 2).to_be_bytes());
+        segment.extend(exif);
+        bytes.splice(2..2, segment);
+        bytes
+    }
+
+    #[test]
+    fn an_image_stands_as_its_camera_was_held() {
+        let upright = decode(&jpeg(1)).unwrap();
+        assert_eq!((upright.width, upright.height), (16, 8));
+        assert!(upright.rgba[0] < 30 && upright.rgba[4 * 15] > 220);
+        // Turned a quarter to the right: what was left is on top.
+        let turned = decode(&jpeg(6)).unwrap();
+        assert_eq!((turned.width, turned.height), (8, 16));
+        assert!(turned.rgba[0] < 30 && turned.rgba[4 * 7] < 30 && turned.rgba[4 * 8 * 15] > 220);
     }
 
     #[test]
