@@ -68,7 +68,7 @@
 //! 7  report -> study          pages of finished work         verify   the project held against others
 //! 6  study -> record          many episodes                          route    chains of snapshots, taught and followed
 //! 5  record -> episode        one recorder a format          episode  a simulation that is stepped
-//! 4  sensor   method   dataset
+//! 4  sensor   method   dataset   homing
 //! 3  physics   render   vision   estimation   control        draw     charts, maps, sheets
 //! 2  world   panorama_set   observation
 //! 1  panorama   document   fault   storage   table   command_line   error   geometry   ode   random   statistics
@@ -105,6 +105,7 @@ pub mod error;
 pub mod estimation;
 pub mod fault;
 pub mod geometry;
+pub mod homing;
 pub mod method;
 pub mod observation;
 pub mod ode;

@@ -6,14 +6,17 @@
 //!
 //! Knows of: everything below; nothing imports it.
 
+mod bearings;
 mod bound;
 mod changes;
 mod compare;
 mod context;
 mod dataset;
 mod drive;
+mod evaluate;
 mod generate;
 mod home;
+mod lens;
 mod map;
 mod observability;
 mod render;
@@ -88,6 +91,10 @@ enum Command {
     Render(Box<render::RenderArgs>),
     /// Panorama sets with ground truth in the field's layouts, and their check
     Dataset(Box<dataset::DatasetArgs>),
+    /// What your own pictures say of the way home: bearings, visual compass, direction of home, and how sure they are
+    Bearings(Box<bearings::BearingsArgs>),
+    /// How well the panoramas of a set, or your own pictures with poses, show the way to one another
+    Evaluate(Box<evaluate::EvaluateArgs>),
     /// Check, draw and describe world files
     World(world::WorldArgs),
 }
@@ -107,10 +114,12 @@ pub fn run() -> Result<Verdict> {
     let args = Args::from_arg_matches(&matches).unwrap_or_else(|fault| fault.format(&mut command).exit());
     let context = &Context::new(&args.common, command, matches)?;
     match args.command {
+        Command::Bearings(args) => bearings::run(&args, context),
         Command::Bound(args) => bound::run(&args, context),
         Command::Compare(args) => compare::run(&args, context),
         Command::Dataset(args) => dataset::run(&args, context),
         Command::Drive(args) => drive::run(&args, context),
+        Command::Evaluate(args) => evaluate::run(&args, context),
         Command::Home(args) => home::run(&args, context),
         Command::Observability(args) => observability::run(&args, context),
         Command::PhysicsReport(args) => verify::physics(&args, context),

@@ -4,6 +4,7 @@
 //! - [`homes`]: several of them at once, where a view may show more than one place.
 //! - [`paper`]: the paper's six-state EKF, exactly as printed but for the transition Jacobian; it must be started near the truth.
 //! - [`observability`]: what of the paper's state its bearings can tell at all.
+//! - [`two_view`]: the way from one view to another, from their landmarks alone.
 //! - [`resection`] and [`gaussian`] serve the anchored filter.
 //!
 //! Knows of: bearings and odometry. Must not know of pictures, worlds or the truth.
@@ -15,3 +16,4 @@ pub mod homes;
 pub mod observability;
 pub mod paper;
 pub mod resection;
+pub mod two_view;

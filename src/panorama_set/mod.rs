@@ -11,6 +11,8 @@
 //! Whatever a set's own sense of azimuth, [`PanoramaSet::load`] gives a [`Panorama`](crate::panorama::Panorama) whose columns run
 //! anti-clockwise. A [`Grid`] says where the places of a set lie about its home.
 //!
+//! A camera's own pictures are a set as well, with a table of where they were taken; a [`Lens`] says what their pixels look at.
+//!
 //! Knows of: panoramas and files. Must not know of worlds or renderers.
 
 mod document;
@@ -19,6 +21,7 @@ mod entry;
 mod grid;
 mod layout;
 mod layouts;
+mod lens;
 mod set;
 mod source;
 mod yaml;
@@ -31,5 +34,6 @@ pub use entry::{Entry, Frame, FramePose, FrameTruth, LandmarkTruth, Names, World
 pub use grid::{Cell, Grid, Place};
 pub use layout::Layout;
 pub use layouts::LayoutKind;
+pub use lens::{Lens, LensKind, RingModel, elevation_rad};
 pub use set::PanoramaSet;
 pub use source::mirror;

@@ -9,7 +9,8 @@ use super::document::{DOCUMENT, Document, MOST_PLACES};
 use super::entry::Entry;
 use super::grid::{Grid, Place};
 use super::layout::{Found, Search};
-use super::layouts::LayoutKind;
+use super::layouts::{LayoutKind, pictures};
+use super::lens::Lens;
 use super::source::{even_rows, file_names, mirror, numbers, picture};
 use crate::error::{Error, Result};
 use crate::panorama::{Panorama, Projection};
@@ -28,6 +29,8 @@ pub struct PanoramaSet {
     document: Option<Document>,
     vertical: Option<(f64, f64)>,
     warnings: Vec<String>,
+    /// What the pixels of a camera's own pictures look at.
+    lens: Option<Lens>,
 }
 
 impl PanoramaSet {
@@ -72,7 +75,8 @@ impl PanoramaSet {
             log::warn!("{warning}");
         }
         let Found { entries, warnings, vertical } = found;
-        let set = Self { folder: folder.to_owned(), layout, entries, document, vertical, warnings };
+        let lens = (layout == LayoutKind::Pictures).then(Lens::default);
+        let set = Self { folder: folder.to_owned(), layout, entries, document, vertical, warnings, lens };
         let (rows, columns) = set.shape();
         let outside = |entry: &&Entry| entry.place.is_some_and(|p| p.i >= rows || p.j >= columns);
         match set.entries.iter().find(outside) {
@@ -86,6 +90,24 @@ impl PanoramaSet {
             }),
             _ => Ok(set),
         }
+    }
+
+    /// A camera's own pictures as a set: those of `folder` that a table of poses lists, by default its `poses.csv`. The table has the
+    /// columns `file`, `x_m`, `y_m`, `heading_deg` and, where pictures of one room are not to be held for those of another, `room`.
+    ///
+    /// # Errors
+    /// When the table cannot be read, lacks a column or a number, or lists a picture that is not there.
+    pub fn of_pictures(folder: &Path, poses: Option<&Path>, lens: Lens) -> Result<Self> {
+        let table = poses.map_or_else(|| folder.join(pictures::POSES), Path::to_owned);
+        Ok(Self {
+            entries: pictures::read_poses(folder, &table)?,
+            folder: folder.to_owned(),
+            layout: LayoutKind::Pictures,
+            document: None,
+            vertical: None,
+            warnings: Vec::new(),
+            lens: Some(lens),
+        })
     }
 
     /// The set's folder.
@@ -216,6 +238,9 @@ impl PanoramaSet {
     /// When there are not so many.
     pub fn load(&self, k: usize) -> Result<Panorama> {
         let entry = &self.entries[k];
+        if let Some(lens) = &self.lens {
+            return lens.read_within(&self.folder, &entry.image);
+        }
         let mut panorama = picture(&self.folder, &entry.image, |width, height| self.projection(width, height))?;
         if let (Some(range), Some(instance)) = (&entry.range, &entry.instance) {
             let millimetres = numbers(&self.folder, range, panorama.projection)?;

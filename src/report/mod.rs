@@ -9,6 +9,7 @@ pub mod bound;
 pub mod compare;
 mod curves;
 pub mod dataset;
+pub mod pairs;
 pub mod paper;
 pub mod robustness;
 pub mod route;

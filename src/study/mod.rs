@@ -5,6 +5,7 @@
 pub mod bound;
 pub mod compare;
 pub mod observability;
+pub mod pairs;
 pub mod paper;
 pub mod pool;
 pub mod robustness;

@@ -8,6 +8,7 @@
 //! | `image-folder` | `CONDITION/N.png`, `metadata.jsonl` | azimuth grows | even in its tangent |
 //! | `webdataset` | `shards/CONDITION-N.tar` with `KEY.rgb.png`, `.range.png`, `.instance.png`, `.json` | azimuth grows | even in its tangent |
 //! | `folder` | `CONDITION/N.rgb.png`, `.range.png`, `.instance.png`, `.json` | azimuth grows | even in its tangent |
+//! | `pictures` (read only) | a camera's, listed in `poses.csv` | azimuth falls, or as the lens says | as the lens says |
 //! | `paper` (read only) | `I_J.png` or `.pgm` | azimuth grows | even in its tangent |
 //!
 //! Where a layout has no place for range and instances, they lie in `truth/CONDITION/`, where none of its readers looks.
@@ -16,6 +17,7 @@ mod folder;
 mod image_database;
 mod image_folder;
 mod moeller;
+pub(super) mod pictures;
 mod vardy;
 mod webdataset;
 
@@ -41,6 +43,8 @@ pub enum LayoutKind {
     ///
     /// Also `cv_<rows-1-i>_<j>_bw<bw>.pgm`.
     Vardy,
+    /// A camera's pictures and a table of their poses, `poses.csv`; read only.
+    Pictures,
     /// The paper's own set, read only: `<i>_<j>.png` or `.pgm`.
     Paper,
     /// A folder a condition; colours, range, instances and truth of each frame.
@@ -57,6 +61,7 @@ impl LayoutKind {
             Self::Moeller => &moeller::Moeller,
             Self::Webdataset => &webdataset::Webdataset,
             Self::Vardy => &vardy::VARDY,
+            Self::Pictures => &pictures::Pictures,
             Self::Paper => &vardy::PAPER,
             Self::Folder => &folder::Folder,
         }
