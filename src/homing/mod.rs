@@ -2,11 +2,15 @@
 //!
 //! A [`Homing`] keeps the panorama at home and gives an [`Answer`] to each other one. What a robot makes of many such answers on its way
 //! is a [`method`](crate::method)'s; here each stands alone, which is how home vectors over a grid of places are judged, and pictures that
-//! somebody took.
+//! somebody took. [`Features`] goes by what vision believes; the others compare whole images, as half of the field does.
 //!
 //! Knows of: panoramas, vision, estimation. Must not know of worlds or the truth.
 
+pub mod descent;
 mod features;
+pub mod grey;
+pub mod ridf;
+pub mod warping;
 
 pub use features::Features;
 
@@ -60,6 +64,12 @@ pub trait Homing: Send {
 pub enum HomingKind {
     /// Bearings of features, and the one planar motion that explains them.
     Features,
+    /// Visual compass: the turn at which the whole image differs least (Zeil and others 2003). No direction of home.
+    Ridf,
+    /// Descent in image distances by matched filters (Moeller, Vardy 2006), after the visual compass.
+    Mfdid,
+    /// MinWarping (Moeller 2009): all steps and turns are tried, columns move as some distance predicts.
+    Minwarping,
 }
 
 impl HomingKind {
@@ -74,6 +84,9 @@ impl HomingKind {
     pub fn at_home(self, home: &Panorama) -> Box<dyn Homing> {
         match self {
             Self::Features => Box::new(Features::new(ExtractorSettings::default(), home)),
+            Self::Ridf => Box::new(ridf::Compass::new(home)),
+            Self::Mfdid => Box::new(descent::Descent::new(home)),
+            Self::Minwarping => Box::new(warping::MinWarping::new(warping::WarpingSettings::default(), home)),
         }
     }
 }

@@ -299,13 +299,14 @@ mod tests {
         let poses = [("lab", 3.4, 3.0, 0.0), ("lab", 3.0, 2.6, 90.0), ("lab", 2.6, 3.1, -140.0), ("crowd", 4.0, 3.0, 10.0)];
         for (k, (name, x, y, heading_deg)) in poses.into_iter().enumerate() {
             let world = World::open(name).unwrap();
-            let pose = Pose::new(x, y, f64::to_radians(heading_deg));
+            // Somewhere free in the other room; the table may say what it likes of it.
+            let pose = if name == "lab" { Pose::new(x, y, f64::to_radians(heading_deg)) } else { world.home };
             let projection = world.projection_of_size(720, 90);
             let mut seen = Panorama::black(projection);
             let view = View { projection, robot: pose, bodies: &world.body_poses() };
             renderer.render(&Scene::new(&world).unwrap(), &view, &mut seen).unwrap();
             crate::panorama_set::mirror(&mut seen);
-            let camera = world.camera_pose(&pose);
+            let camera = world.camera_pose(&Pose::new(x, y, f64::to_radians(heading_deg)));
             image::RgbaImage::from_raw(720, 90, seen.rgba).unwrap().save(folder.join(format!("{k}.png"))).unwrap();
             table += &format!("{k}.png,{},{},{heading_deg},{name}\n", camera.x, camera.y);
         }
@@ -316,7 +317,9 @@ mod tests {
     fn pictures_of_one_room_show_the_way_and_those_of_another_none() {
         let folder = tempfile::tempdir().unwrap();
         pictures(folder.path());
-        let lens = Lens { kind: crate::panorama_set::LensKind::Cylindrical, ..Lens::default() };
+        // The room's camera looks up a little.
+        let horizon_row = Some(World::open("lab").unwrap().projection_of_size(720, 90).horizon_row);
+        let lens = Lens { kind: crate::panorama_set::LensKind::Cylindrical, horizon_row, ..Lens::default() };
         let set = PanoramaSet::of_pictures(folder.path(), None, lens).unwrap();
         let pairs = Pairs { methods: vec![HomingKind::Features], farthest_m: 5.0, tolerance_rad: 0.035 };
         let rows = pairs.run(&set, &Pool::new(2), &|| ()).unwrap();
@@ -324,7 +327,7 @@ mod tests {
         assert_eq!((same.len(), other.len()), (6, 6));
         for row in same {
             assert!(row.landmarks > 40 && 20 * row.right >= 19 * row.landmarks && !row.is_wrong(), "{row:?}");
-            assert!(row.turn_error_deg.unwrap().abs() < 1.0 && row.home_error_deg.unwrap().abs() < 3.0, "{row:?}");
+            assert!(row.turn_error_deg.unwrap().abs() < 0.7 && row.home_error_deg.unwrap().abs() < 3.0, "{row:?}");
         }
         assert!(other.iter().all(|row| !row.is_answered() && row.landmarks == 0));
         let all = summaries(&rows);
