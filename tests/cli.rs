@@ -614,3 +614,42 @@ fn the_vision_page_keeps_its_pairs_to_itself() {
         assert_eq!(read("page"), read("again"), "{name}");
     }
 }
+
+/// The program's own panoramas as a camera's pictures: they say the way home, and what cannot be is named.
+#[test]
+fn pictures_say_the_way_home() {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, pose) in [("home", "3.4,3.0,0"), ("now", "3.0,2.6,90")] {
+        let out = ["render", "lab", "--pose", pose, "--size", "720x90", "--renderer", "cpu", "--out", name];
+        assert_done(&run(folder.path(), &out));
+    }
+    let own = ["--lens", "cylindrical", "--anticlockwise", "--horizon-row", "54"];
+    let bearings = ["bearings", "home/rgb.png", "now/rgb.png", "--out", "all.csv", "--json"];
+    let output = run(folder.path(), &[&bearings[..], &own[..]].concat());
+    assert_done(&output);
+    let rows: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let number = |key: &str| rows[0][key].as_f64().unwrap();
+    assert!((number("turn_deg") - 90.0).abs() < 1.0, "{rows}");
+    // Home is ahead and to the left in the room, at 45 degrees, seen from a robot that looks along y.
+    assert!((number("home_deg") + 45.0).abs() < 3.0, "{rows}");
+    let table = std::fs::read_to_string(folder.path().join("all.csv")).unwrap();
+    assert_eq!(table.lines().count() as u64, rows[0]["bearings"].as_u64().unwrap() + 1);
+    assert_fails(&run(folder.path(), &[&bearings[..5], &own[..]].concat()), 1, &["all.csv"]);
+    let ring = ["bearings", "home/rgb.png", "now/rgb.png", "--lens", "ring", "--radii", "10,300"];
+    assert_fails(&run(folder.path(), &ring), 1, &["radii 10 to 300 px", "720 x 90 pixels"]);
+    assert_fails(&run(folder.path(), &["bearings", "home/rgb.png", "gone.png"]), 1, &["gone.png"]);
+
+    let set =
+        ["dataset", "lab", "--grid", "3x3", "--spacing-m", "0.3", "--size", "360x45", "--renderer", "cpu", "--out", "set"];
+    assert_done(&run(folder.path(), &set));
+    let evaluate = ["evaluate", "set", "--methods", "ridf,minwarping", "--out", "evaluated", "--json"];
+    let output = run(folder.path(), &evaluate);
+    assert_done(&output);
+    let result: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let warping = &result["fields"][1];
+    assert_eq!((warping["method"].as_str(), warping["homes"].as_u64()), (Some("minwarping"), Some(9)), "{result}");
+    assert!(warping["return_ratio"].as_f64().unwrap() > 0.9 && warping["aae_deg"].as_f64().unwrap() < 15.0, "{result}");
+    for file in ["README.md", "pairs.csv", "homes.csv"] {
+        assert!(folder.path().join("evaluated").join(file).is_file(), "{file}");
+    }
+}

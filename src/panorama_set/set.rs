@@ -13,6 +13,7 @@ use super::layouts::{LayoutKind, pictures};
 use super::lens::Lens;
 use super::source::{even_rows, file_names, mirror, numbers, picture};
 use crate::error::{Error, Result};
+use crate::geometry::Pose;
 use crate::panorama::{Panorama, Projection};
 
 /// Folders of a set that hold no condition.
@@ -161,6 +162,17 @@ impl PanoramaSet {
         }
         self.entries.retain(|e| e.condition == condition);
         Ok(self)
+    }
+
+    /// The set with poses of the panoramas on a grid of this spacing that have none of their own: all look along x.
+    #[must_use]
+    pub fn posed(mut self, spacing_m: Option<f64>) -> Self {
+        if let Some(grid) = self.grid(spacing_m, Some(Place { i: 0, j: 0 })) {
+            for entry in self.entries.iter_mut().filter(|e| e.pose.is_none()) {
+                entry.pose = entry.place.map(|place| grid.position(place)).map(|at| Pose::new(at.x, at.y, 0.0));
+            }
+        }
+        self
     }
 
     /// Rows and columns of the grid, those of places without a panorama included; (0, 0) for a set without places.

@@ -4,6 +4,7 @@
 
 pub mod bound;
 pub mod compare;
+pub mod field;
 pub mod observability;
 pub mod pairs;
 pub mod paper;

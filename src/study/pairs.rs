@@ -98,9 +98,36 @@ pub struct PairRow {
     pub home_error_deg: Option<f64>,
     /// Its stated standard deviation, degrees.
     pub home_sd_deg: Option<f64>,
+    /// Where now is from home, m, in the set's frame.
+    pub from_home_m: [f64; 2],
+    /// Direction in which home is held to be, degrees in the set's frame.
+    pub toward_deg: Option<f64>,
 }
 
 impl PairRow {
+    /// A row without an answer.
+    #[must_use]
+    pub fn empty(method: HomingKind, lie: Lie) -> Self {
+        Self {
+            method,
+            home: String::new(),
+            now: String::new(),
+            home_room: String::new(),
+            now_room: String::new(),
+            lie,
+            distance_m: 0.0,
+            landmarks: 0,
+            right: 0,
+            alternatives: 0,
+            turn_error_deg: None,
+            turn_sd_deg: None,
+            home_error_deg: None,
+            home_sd_deg: None,
+            from_home_m: [0.0; 2],
+            toward_deg: None,
+        }
+    }
+
     /// Whether there is an answer.
     #[must_use]
     pub fn is_answered(&self) -> bool {
@@ -121,35 +148,30 @@ impl PairRow {
     }
 }
 
-/// What is asked of a set's pairs.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Pairs {
-    /// Methods.
-    pub methods: Vec<HomingKind>,
-    /// Pairs of one room that are farther apart are passed over, m.
-    pub farthest_m: f64,
-    /// A landmark is right within this angle, rad.
-    pub tolerance_rad: f64,
+/// Panoramas nearer than this were taken at one place, m.
+const SAME_M: f64 = 1e-6;
+
+/// The panoramas of a set, each loaded once.
+struct Views<'a> {
+    set: &'a PanoramaSet,
+    poses: Vec<Pose>,
+    loaded: Vec<OnceLock<Panorama>>,
 }
 
-impl Pairs {
-    /// Looks at all pairs of a set; rows come method by method, home by home.
-    ///
-    /// # Errors
-    /// When the set does not tell where its panoramas were taken, has fewer than two, does not fit into memory or cannot be read.
-    pub fn run(&self, set: &PanoramaSet, pool: &Pool<'_>, watch: &(dyn Fn() + Sync)) -> Result<Vec<PairRow>> {
+impl<'a> Views<'a> {
+    fn of(set: &'a PanoramaSet) -> Result<Self> {
         let entries = set.entries();
-        let poses = entries.iter().map(|e| e.pose).collect::<Option<Vec<Pose>>>().ok_or_else(|| Error::Unfit {
-            what: format!("poses of the set in {}", set.folder().display()),
-            found: "none".to_owned(),
-            needed: "a set that says where its panoramas were taken, or a table of poses".to_owned(),
+        let unfit = |what: &str, found: String, needed: &str| Error::Unfit {
+            what: format!("{what} of the set in {}", set.folder().display()),
+            found,
+            needed: needed.to_owned(),
+        };
+        let poses = entries.iter().map(|e| e.pose).collect::<Option<Vec<Pose>>>().ok_or_else(|| {
+            let needed = "a set that says where its panoramas were taken, a table of poses, or --spacing-m with a grid";
+            unfit("poses", "none".to_owned(), needed)
         })?;
         if entries.len() < 2 {
-            return Err(Error::Unfit {
-                what: format!("panoramas of the set in {}", set.folder().display()),
-                found: entries.len().to_string(),
-                needed: "two at least".to_owned(),
-            });
+            return Err(unfit("panoramas", entries.len().to_string(), "two at least"));
         }
         let bytes = set.load(0)?.rgba.len();
         if bytes * entries.len() > MOST_BYTES {
@@ -159,34 +181,73 @@ impl Pairs {
                 needed: format!("at most {MOST_BYTES} bytes in all; smaller ones by --width-px"),
             });
         }
-        let loaded: Vec<OnceLock<Panorama>> = entries.iter().map(|_| OnceLock::new()).collect();
-        let panorama = |k: usize| -> Result<&Panorama> {
-            if loaded[k].get().is_none() {
-                let _ = loaded[k].set(set.load(k)?);
-            }
-            loaded[k].get().ok_or_else(|| Error::Threads("a panorama that was loaded is gone".to_owned()))
-        };
-        let room = |k: usize| entries[k].world.as_ref().map_or("", |w| w.world.as_str());
+        Ok(Self { set, poses, loaded: entries.iter().map(|_| OnceLock::new()).collect() })
+    }
+
+    fn panorama(&self, k: usize) -> Result<&Panorama> {
+        if self.loaded[k].get().is_none() {
+            let _ = self.loaded[k].set(self.set.load(k)?);
+        }
+        self.loaded[k].get().ok_or_else(|| Error::Threads("a panorama that was loaded is gone".to_owned()))
+    }
+
+    fn room(&self, k: usize) -> &str {
+        self.set.entries()[k].world.as_ref().map_or("", |w| w.world.as_str())
+    }
+
+    fn name(&self, k: usize) -> [String; 2] {
+        [self.set.entries()[k].key.clone(), self.room(k).to_owned()]
+    }
+}
+
+/// What is asked of a set's pairs.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Pairs {
+    /// Methods.
+    pub methods: Vec<HomingKind>,
+    /// Pairs of one room that are farther apart are passed over, m.
+    pub farthest_m: f64,
+    /// How many panoramas are home in turn, evenly spread over the set; by default all.
+    pub homes: Option<usize>,
+    /// A landmark is right within this angle, rad.
+    pub tolerance_rad: f64,
+}
+
+impl Pairs {
+    /// Looks at all pairs of a panorama of `homes` and one of `set` taken elsewhere: of one set, or of two that show the same places under
+    /// two conditions. Rows come method by method, home by home.
+    ///
+    /// # Errors
+    /// When the set does not tell where its panoramas were taken, has fewer than two, does not fit into memory or cannot be read.
+    pub fn run(
+        &self,
+        homes: &PanoramaSet,
+        set: &PanoramaSet,
+        pool: &Pool<'_>,
+        watch: &(dyn Fn() + Sync),
+    ) -> Result<Vec<PairRow>> {
+        let (homes, nows) = (Views::of(homes)?, Views::of(set)?);
+        let count = self.homes.unwrap_or(homes.poses.len()).clamp(1, homes.poses.len());
         let jobs: Vec<(HomingKind, usize)> =
-            self.methods.iter().flat_map(|m| (0..entries.len()).map(move |k| (*m, k))).collect();
+            self.methods.iter().flat_map(|m| (0..count).map(|k| (*m, k * homes.poses.len() / count))).collect();
         let rows = pool.map(
             &jobs,
             || (),
             |(), &(method, home), halted| {
-                let mut homing = method.at_home(panorama(home)?);
+                let mut homing = method.at_home(homes.panorama(home)?);
                 let mut rows = Vec::new();
-                for now in (0..entries.len()).filter(|now| *now != home) {
+                for (now, pose) in nows.poses.iter().enumerate() {
                     if halted() {
                         return Err(Error::Interrupted);
                     }
-                    let distance_m = (poses[now].position() - poses[home].position()).norm();
-                    let same_room = room(home) == room(now);
-                    if same_room && distance_m > self.farthest_m {
+                    let distance_m = (pose.position() - homes.poses[home].position()).norm();
+                    let same_room = homes.room(home) == nows.room(now);
+                    if same_room && (distance_m > self.farthest_m || distance_m < SAME_M) {
                         continue;
                     }
-                    let answer = homing.look(panorama(now)?)?;
-                    let names = [home, now].map(|k| (entries[k].key.clone(), room(k).to_owned()));
-                    rows.push(self.row(method, names, Lie::of(distance_m, same_room), &poses[home], &poses[now], &answer));
+                    let answer = homing.look(nows.panorama(now)?)?;
+                    let names = [homes.name(home), nows.name(now)];
+                    rows.push(self.row(method, names, Lie::of(distance_m, same_room), &homes.poses[home], pose, &answer));
                 }
                 watch();
                 Ok(rows)
@@ -195,29 +256,20 @@ impl Pairs {
         Ok(rows.into_iter().flatten().collect())
     }
 
-    fn row(
-        &self,
-        method: HomingKind,
-        names: [(String, String); 2],
-        lie: Lie,
-        home: &Pose,
-        now: &Pose,
-        answer: &Answer,
-    ) -> PairRow {
+    fn row(&self, method: HomingKind, names: [[String; 2]; 2], lie: Lie, home: &Pose, now: &Pose, answer: &Answer) -> PairRow {
         let step = home.to_local(now);
         let way = angle_of(step.position());
         let right = answer.landmarks.iter().filter(|l| miss_rad(l, way, step.heading) <= self.tolerance_rad).count();
         let true_home = angle_of(now.inverse_transform(home.position()));
         let degrees = |rad: f64| Some(rad.to_degrees());
-        let [(home_name, home_room), (now_name, now_room)] = names;
+        let [[home_name, home_room], [now_name, now_room]] = names;
+        let from_home = now.position() - home.position();
         PairRow {
-            method,
             home: home_name,
             now: now_name,
             home_room,
             now_room,
-            lie,
-            distance_m: (now.position() - home.position()).norm(),
+            distance_m: from_home.norm(),
             landmarks: answer.landmarks.len(),
             right,
             alternatives: answer.alternatives,
@@ -225,6 +277,9 @@ impl Pairs {
             turn_sd_deg: answer.turn.and_then(|a| degrees(a.sd_rad?)),
             home_error_deg: answer.home.and_then(|a| degrees(wrap(a.rad - true_home))),
             home_sd_deg: answer.home.and_then(|a| degrees(a.sd_rad?)),
+            from_home_m: from_home.into(),
+            toward_deg: answer.home.and_then(|a| degrees(wrap(a.rad + now.heading))),
+            ..PairRow::empty(method, lie)
         }
     }
 }
@@ -321,8 +376,8 @@ mod tests {
         let horizon_row = Some(World::open("lab").unwrap().projection_of_size(720, 90).horizon_row);
         let lens = Lens { kind: crate::panorama_set::LensKind::Cylindrical, horizon_row, ..Lens::default() };
         let set = PanoramaSet::of_pictures(folder.path(), None, lens).unwrap();
-        let pairs = Pairs { methods: vec![HomingKind::Features], farthest_m: 5.0, tolerance_rad: 0.035 };
-        let rows = pairs.run(&set, &Pool::new(2), &|| ()).unwrap();
+        let pairs = Pairs { methods: vec![HomingKind::Features], farthest_m: 5.0, homes: None, tolerance_rad: 0.035 };
+        let rows = pairs.run(&set, &set, &Pool::new(2), &|| ()).unwrap();
         let (same, other): (Vec<_>, Vec<_>) = rows.iter().partition(|r| r.home_room == r.now_room);
         assert_eq!((same.len(), other.len()), (6, 6));
         for row in same {
@@ -339,8 +394,8 @@ mod tests {
 
     #[test]
     fn an_answer_is_wrong_where_its_landmarks_or_its_directions_are() {
-        let pairs = Pairs { methods: vec![HomingKind::Features], farthest_m: 5.0, tolerance_rad: 0.035 };
-        let names = || [(); 2].map(|()| (String::new(), String::new()));
+        let pairs = Pairs { methods: vec![HomingKind::Features], farthest_m: 5.0, homes: None, tolerance_rad: 0.035 };
+        let names = || [(); 2].map(|()| [String::new(), String::new()]);
         let (home, now) = (Pose::IDENTITY, Pose::new(1.0, 0.0, 0.5));
         let angle = |rad: f64| Some(Angle { rad, sd_rad: None });
         let row = |turn: f64, way: f64| {
