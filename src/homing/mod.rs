@@ -70,6 +70,8 @@ pub enum HomingKind {
     Mfdid,
     /// MinWarping (Moeller 2009): all steps and turns are tried, columns move as some distance predicts.
     Minwarping,
+    /// The same after the mean of each column is taken away and all views are brought to one contrast, against changes of light.
+    MinwarpingNormalised,
 }
 
 impl HomingKind {
@@ -86,6 +88,10 @@ impl HomingKind {
             Self::Features => Box::new(Features::new(ExtractorSettings::default(), home)),
             Self::Ridf => Box::new(ridf::Compass::new(home)),
             Self::Mfdid => Box::new(descent::Descent::new(home)),
+            Self::MinwarpingNormalised => {
+                let settings = warping::WarpingSettings { is_light_free: true, ..warping::WarpingSettings::default() };
+                Box::new(warping::MinWarping::new(settings, home))
+            }
             Self::Minwarping => Box::new(warping::MinWarping::new(warping::WarpingSettings::default(), home)),
         }
     }

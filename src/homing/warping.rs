@@ -26,12 +26,15 @@ pub struct WarpingSettings {
     pub rows: usize,
     /// Scales at which columns are compared, rising; of what is farther off the nearest is taken.
     pub scales: Vec<f64>,
+    /// Whether the mean of each column is taken away, and the rest is brought to one contrast: light that changes a wall's brightness as a
+    /// whole, and that of all by one factor, then changes nothing.
+    pub is_light_free: bool,
 }
 
 impl Default for WarpingSettings {
     fn default() -> Self {
         let scales = (-4..=4).map(|k| libm::exp2(f64::from(k) / 4.0)).collect();
-        Self { steps: 128, columns_per_step: 3, rows: 48, scales }
+        Self { steps: 128, columns_per_step: 3, rows: 48, scales, is_light_free: false }
     }
 }
 
@@ -167,7 +170,28 @@ fn prepared(view: &Grey, settings: &WarpingSettings) -> Grey {
         view.projection.height = settings.rows as u32;
         view.projection.horizon_row -= first as f64;
     }
+    if settings.is_light_free {
+        view.pixels = light_free(&view);
+    }
     view
+}
+
+/// Grey level that stands for a column's mean, and standard deviation of a whole view.
+const MIDDLE: f64 = 128.0;
+const CONTRAST: f64 = 40.0;
+
+/// The pixels less the mean of their column, with the same standard deviation for every view.
+fn light_free(view: &Grey) -> Vec<u8> {
+    let (width, height) = (view.width(), view.height());
+    let mut sums = vec![0_u32; width];
+    for row in view.pixels.chunks_exact(width) {
+        sums.iter_mut().zip(row).for_each(|(sum, pixel)| *sum += u32::from(*pixel));
+    }
+    let means: Vec<f64> = sums.iter().map(|sum| f64::from(*sum) / height as f64).collect();
+    let off = |k: usize| f64::from(view.pixels[k]) - means[k % width];
+    let squares: f64 = (0..view.pixels.len()).map(|k| off(k) * off(k)).sum();
+    let gain = CONTRAST / (squares / view.pixels.len() as f64).sqrt().max(1.0);
+    (0..view.pixels.len()).map(|k| (MIDDLE + gain * off(k)).round().clamp(0.0, 255.0) as u8).collect()
 }
 
 /// Adds up the scores; turns run backwards.
@@ -313,6 +337,20 @@ mod tests {
                 assert_eq!(found.values[d * 16 + turn], score, "direction {d}, turn {turn}");
             }
         }
+    }
+
+    #[test]
+    fn brightness_and_contrast_are_taken_away() {
+        let bright = noise(48, 9, "home");
+        let mut dark = bright.clone();
+        for (k, pixel) in dark.rgba.chunks_exact_mut(4).enumerate() {
+            // Half as much light, and a lamp beside some columns.
+            let lamp = if k % 48 < 20 { 60 } else { 10 };
+            pixel[..3].iter_mut().for_each(|p| *p = *p / 2 + lamp);
+        }
+        let [bright, dark] = [bright, dark].map(|view| light_free(&Grey::of(&view)));
+        let most = bright.iter().zip(&dark).map(|(a, b)| a.abs_diff(*b)).max();
+        assert!(most.is_some_and(|most| most <= 2), "{most:?}");
     }
 
     #[test]
