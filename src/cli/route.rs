@@ -108,8 +108,8 @@ pub struct RepeatArgs {
     /// Seeds of the repeats, both included
     #[arg(long, value_name = "A..B", default_value = "1..10", value_parser = seeds)]
     seeds: RangeInclusive<u64>,
-    /// What drives the legs
-    #[arg(long, default_value = "local-map", value_parser = choice::<Engine>())]
+    /// What drives the legs: local-map, odometry, or any homing method
+    #[arg(long, value_name = "METHOD", default_value = "local-map", value_parser = engine)]
     method: Engine,
     /// Drive it from its end to its start
     #[arg(long)]
@@ -136,6 +136,10 @@ pub struct RepeatArgs {
     out: Option<PathBuf>,
 }
 
+fn engine(name: &str) -> std::result::Result<Engine, String> {
+    name.parse().map_err(|e: wayhome::Error| e.to_string())
+}
+
 fn rule(name: &str) -> std::result::Result<SnapshotRule, String> {
     SnapshotRule::named(name).map_err(|e| e.to_string())
 }
@@ -155,7 +159,8 @@ fn run_teach(args: &TeachArgs, context: &Context) -> Result<Verdict> {
         _ => tour(&world, args.seed, args.tour_m.unwrap_or(30.0))?,
     };
     let rule = args.spacing.map_or(Ok(args.rule), |number| args.rule.with(number))?;
-    let teaching = Teaching { rule, features: args.features.into(), look: args.eye.look.look(), seed: args.seed };
+    let node_m = if args.form == Form::Small { 0.25 } else { Teaching::default().node_m };
+    let teaching = Teaching { rule, features: args.features.into(), node_m, look: args.eye.look.look(), seed: args.seed };
     wayhome::route::teach::way(&world, &points)?; // before a folder is made for a way that cannot be driven
     let (out, folder) = open_folder(args.out.as_deref(), &["route", &world.spec.name, &args.seed.to_string()], "route teach")?;
     let stage = Stage::new(&world, args.eye.size, args.eye.every, args.eye.renderer)?;
@@ -175,7 +180,7 @@ fn run_repeat(args: &RepeatArgs, context: &Context) -> Result<Verdict> {
     let stage = Stage::new(&world, args.eye.size, args.eye.every, args.eye.renderer)?;
     wayhome::route::repeat::check(&stage, &route, &truth)?;
     let repeating = Repeating {
-        engine: args.method,
+        engine: args.method.clone(),
         way: if args.backwards { Way::Backwards } else { Way::Forwards },
         laps: args.laps,
         begin: if args.anywhere { Begin::Anywhere } else { Begin::AtStart },

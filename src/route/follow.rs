@@ -1,17 +1,20 @@
 //! Repeating: a robot that knows a route follows it.
 
-use serde::Serialize;
-use strum::{EnumMessage, IntoStaticStr, VariantArray};
+use std::fmt;
+use std::str::FromStr;
 
 use crate::control::escape::Escape;
+use crate::error::{Error, Result};
 use crate::geometry::{Pose, Twist};
+use crate::method::MethodKind;
 use crate::observation::{Observation, RobotSheet, Status, TaskSheet};
-use crate::panorama::Panorama;
+use crate::panorama::{Panorama, Picture};
 use crate::vision::ExtractorSettings;
 use crate::vision::view::ViewFinder;
 
 use super::chart::{Line, Route};
 use super::learn::FEATURES;
+use super::legs::{Doubts, Leg, Seen, is_over};
 use super::locate::{Locator, Looked};
 use super::steer::{progress, steer};
 
@@ -26,15 +29,38 @@ pub enum Way {
 }
 
 /// What drives the legs.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, EnumMessage, IntoStaticStr, VariantArray)]
-#[serde(rename_all = "kebab-case")]
-#[strum(serialize_all = "kebab-case")]
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub enum Engine {
     /// A map around each snapshot of its features' bearings and ranges, in which the robot finds its pose.
     #[default]
     LocalMap,
     /// Odometry alone, as if it were true: the floor that everything has to beat.
     Odometry,
+    /// A homing method, to which each snapshot is home for a while.
+    Method(MethodKind),
+}
+
+impl fmt::Display for Engine {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::LocalMap => f.write_str("local-map"),
+            Self::Odometry => f.write_str("odometry"),
+            Self::Method(kind) => kind.fmt(f),
+        }
+    }
+}
+
+impl FromStr for Engine {
+    type Err = Error;
+
+    /// `local-map`, `odometry` or the name of a homing method.
+    fn from_str(text: &str) -> Result<Self> {
+        Ok(match text {
+            "local-map" => Self::LocalMap,
+            "odometry" => Self::Odometry,
+            other => Self::Method(other.parse()?),
+        })
+    }
 }
 
 /// Where the robot starts, as far as it is told.
@@ -57,6 +83,10 @@ const END_M: f64 = 0.012;
 const END_SD_M: f64 = 0.03;
 /// How long it waits there for its place to become known, s.
 const END_WAIT_S: f64 = 8.0;
+/// A homing method is sent to a snapshot that lies so far ahead, m, ...
+const AIM_M: f64 = 0.45;
+/// ... and on to the next when odometry says that this one was passed by so much, m.
+const MISSED_M: f64 = 0.5;
 /// How long it stands before something in its way at the end or tries to get round elsewhere, s.
 const BLOCKED_S: f64 = 60.0;
 
@@ -94,6 +124,10 @@ pub struct Follower<'r> {
     waits_since_s: Option<f64>,
     progressed: (f64, f64),
     status: Status,
+    /// Of a homing method: the leg under way and its snapshot, what the last picture told, and what pictures have not told.
+    leg: Option<(usize, Leg)>,
+    seen: Option<Seen>,
+    doubts: Doubts,
 }
 
 impl<'r> Follower<'r> {
@@ -135,6 +169,9 @@ impl<'r> Follower<'r> {
             waits_since_s: None,
             progressed: (0.0, 0.0),
             status: Status::Running,
+            leg: None,
+            seen: None,
+            doubts: Doubts::default(),
         }
     }
 
@@ -158,17 +195,89 @@ impl<'r> Follower<'r> {
     /// Takes one observation and says how to drive until the next.
     pub fn step(&mut self, observation: &Observation<'_>) -> Step {
         self.locator.advance(&observation.odometry);
+        if let Engine::Method(kind) = &self.engine {
+            let kind = kind.clone();
+            return self.guided(&kind, observation);
+        }
         let looked = match observation.panorama {
             Some(picture) if self.engine == Engine::LocalMap => {
-                self.picture.projection = picture.projection;
-                self.picture.rgba.clear();
-                self.picture.rgba.extend_from_slice(picture.rgba);
-                self.finder.look(&self.picture);
+                self.take(picture);
                 Some(self.look(observation.time_s))
             }
             _ => None,
         };
         let command = self.drive(observation);
+        Step { command, status: self.status, looked }
+    }
+
+    /// Finds the features of a picture.
+    fn take(&mut self, picture: Picture<'_>) {
+        self.picture.projection = picture.projection;
+        self.picture.rgba.clear();
+        self.picture.rgba.extend_from_slice(picture.rgba);
+        self.finder.look(&self.picture);
+    }
+
+    /// The snapshot to steer for from here: the first that lies far enough ahead.
+    fn target(&self) -> usize {
+        let ahead = |k: &usize| self.at_m[*k] >= self.along_m + AIM_M;
+        let all = 0..self.at_m.len();
+        match self.way {
+            Way::Forwards => all.clone().find(ahead).unwrap_or(all.end - 1),
+            Way::Backwards => all.rev().find(ahead).unwrap_or(0),
+        }
+    }
+
+    /// One step with a homing method.
+    fn guided(&mut self, kind: &MethodKind, observation: &Observation<'_>) -> Step {
+        if self.leg.is_none() {
+            let target = self.target();
+            let travel_rad = self.line.direction_rad(self.at_m[target]) - self.route.pose(target).heading;
+            match Leg::new(kind, self.locator.features(target), travel_rad, (self.robot, self.task)) {
+                Ok(leg) => self.leg = Some((target, leg)),
+                Err(_) => self.status = Status::Failed,
+            }
+        }
+        let Some((target, mut leg)) = self.leg.take() else {
+            return Step { command: Twist::default(), status: self.status, looked: None };
+        };
+        let is_new = observation.panorama.is_some();
+        if let Some(picture) = observation.panorama {
+            self.take(picture);
+            self.seen = leg.look(&self.finder, &self.route.pose(target).to_local(&self.locator.pose()));
+            if self.doubts.count(self.seen.as_ref()) {
+                self.status = Status::Lost;
+            }
+        }
+        let decision = leg.decide(observation, is_new);
+        let pose = self.locator.pose();
+        self.along_m = progress(&self.line, self.along_m, &pose).along_m;
+        if self.along_m > self.progressed.0 + 0.1 {
+            self.progressed = (self.along_m, observation.time_s);
+        } else if observation.time_s - self.progressed.1 > BLOCKED_S {
+            self.status = Status::Lost;
+        }
+        let is_last = self.line.length_m() - self.at_m[target] < 1e-6;
+        let over = is_over(&decision, self.seen.as_ref().filter(|_| is_new));
+        let missed = self.along_m > self.at_m[target] + MISSED_M;
+        if over || missed {
+            if let Some(seen) = self.seen.filter(|_| over) {
+                self.locator.stand_at(target, seen.heading_rad);
+            }
+            self.along_m = self.at_m[target].max(self.along_m);
+            if is_last && self.status == Status::Running {
+                self.status = if over { Status::Arrived } else { Status::Lost };
+            }
+        } else {
+            self.leg = Some((target, leg));
+        }
+        let matched = self.seen.map_or(0, |seen| seen.matched);
+        let looked = is_new.then_some(Looked { expected: self.locator.count(target), matched, rejected: 0 });
+        let command = if self.status == Status::Running {
+            self.escape.guard(observation.time_s, &pose, observation.bumper, decision.command)
+        } else {
+            Twist::default()
+        };
         Step { command, status: self.status, looked }
     }
 

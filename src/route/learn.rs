@@ -13,9 +13,7 @@ use super::rule::{Since, SnapshotRule};
 
 /// Features looked for in a picture.
 pub const FEATURES: usize = 300;
-/// Nodes of the path lie at least so far apart, m, ...
-const NODE_M: f64 = 0.1;
-/// ... or are turned by so much, rad.
+/// Nodes of the path are kept where the robot has turned by so much, rad, at the latest.
 const NODE_RAD: f64 = 0.15;
 /// Half width of the window in which a followed feature is looked for again, rad.
 const WINDOW_RAD: f64 = 0.09;
@@ -42,6 +40,7 @@ struct Followed {
 pub struct Learner {
     rule: SnapshotRule,
     most_features: usize,
+    node_m: f64,
     finder: ViewFinder,
     pose: Pose,
     followed: Vec<Followed>,
@@ -56,12 +55,13 @@ pub struct Learner {
 }
 
 impl Learner {
-    /// One that keeps snapshots of at most `most_features` features by `rule`.
+    /// One that keeps snapshots of at most `most_features` features by `rule`, and nodes of the path `node_m` apart.
     #[must_use]
-    pub fn new(rule: SnapshotRule, most_features: usize) -> Self {
+    pub fn new(rule: SnapshotRule, most_features: usize, node_m: f64) -> Self {
         Self {
             rule,
             most_features,
+            node_m,
             finder: ViewFinder::new(ExtractorSettings::default(), FEATURES),
             pose: Pose::IDENTITY,
             followed: Vec::new(),
@@ -102,7 +102,7 @@ impl Learner {
         self.describe_change();
         let due = is_first || self.rule.is_due(&self.since);
         let node_due = self.path.last().is_none_or(|last| {
-            (self.pose.position() - last.position()).norm() >= NODE_M
+            (self.pose.position() - last.position()).norm() >= self.node_m
                 || wrap(self.pose.heading - last.heading).abs() >= NODE_RAD
         });
         if due || node_due {

@@ -83,6 +83,24 @@ impl<'r> Locator<'r> {
         self.is_lost = true;
     }
 
+    /// The features of a snapshot that are looked for.
+    #[must_use]
+    pub fn features(&self, snapshot: usize) -> Vec<ViewFeature> {
+        self.landmarks[snapshot].iter().map(|landmark| landmark.feature).collect()
+    }
+
+    /// How many they are.
+    #[must_use]
+    pub fn count(&self, snapshot: usize) -> usize {
+        self.landmarks[snapshot].len()
+    }
+
+    /// Believes to stand where a snapshot was taken, with this heading in its frame.
+    pub fn stand_at(&mut self, snapshot: usize, heading_rad: f64) {
+        (self.snapshot, self.pose) = (snapshot, Pose::new(0.0, 0.0, heading_rad));
+        self.covariance = spread((0.05, 0.03));
+    }
+
     /// Whether it has lost its way.
     #[must_use]
     pub fn is_lost(&self) -> bool {
@@ -273,10 +291,8 @@ impl<'r> Locator<'r> {
     /// Pose of the last snapshot in the frame of the first, if it was taken thereabouts: a loop can be gone round again.
     #[must_use]
     pub fn closing(&self, finder: &mut ViewFinder) -> Option<Pose> {
-        let last: Vec<ViewFeature> = self.landmarks.last()?.iter().map(|landmark| landmark.feature).collect();
-        finder.recall(last, self.route.sheet.projection.pixel_rad());
-        let first: Vec<ViewFeature> = self.landmarks.first()?.iter().map(|landmark| landmark.feature).collect();
-        let agreement = finder.compare(&first).filter(|agreement| agreement.matches.len() >= FOUND)?;
+        finder.recall(self.features(self.landmarks.len() - 1), self.route.sheet.projection.pixel_rad());
+        let agreement = finder.compare(&self.features(0)).filter(|agreement| agreement.matches.len() >= FOUND)?;
         let (_, pose, _) = self.refined(finder, 0, &agreement)?;
         Some(pose)
     }
@@ -299,12 +315,8 @@ impl<'r> Locator<'r> {
 
     /// Looks for the robot all along the route. On success it is not lost any more.
     pub fn search(&mut self, finder: &ViewFinder) -> bool {
-        let mut agreements: Vec<(usize, Agreement)> = (0..self.landmarks.len())
-            .filter_map(|k| {
-                let features: Vec<ViewFeature> = self.landmarks[k].iter().map(|l| l.feature).collect();
-                Some((k, finder.compare(&features)?))
-            })
-            .collect();
+        let mut agreements: Vec<(usize, Agreement)> =
+            (0..self.landmarks.len()).filter_map(|k| Some((k, finder.compare(&self.features(k))?))).collect();
         agreements.sort_by_key(|(k, agreement)| (std::cmp::Reverse(agreement.matches.len()), *k));
         let Some((best, first)) = agreements.first() else { return false };
         let here = self.route.pose(*best);

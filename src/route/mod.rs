@@ -35,6 +35,7 @@
 pub mod chart;
 pub mod follow;
 pub mod learn;
+mod legs;
 pub mod locate;
 pub mod measure;
 mod ranges;

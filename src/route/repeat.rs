@@ -199,8 +199,14 @@ pub fn repeat(
     let mut simulation = stage.simulation(&changed, repeating.look)?;
     simulation.reset_at(seed, start)?;
     let briefing = simulation.briefing();
-    let mut follower =
-        Follower::new(route, repeating.engine, repeating.way, repeating.begin, repeating.laps, (briefing.robot, briefing.task));
+    let mut follower = Follower::new(
+        route,
+        repeating.engine.clone(),
+        repeating.way,
+        repeating.begin,
+        repeating.laps,
+        (briefing.robot, briefing.task),
+    );
     if repeating.hidden > 0.0 {
         let hidden = Seed(seed).derive("hidden");
         follower.locator_mut().hide(|track| {

@@ -34,6 +34,8 @@ pub enum SnapshotRule {
     Waypoints,
 }
 
+/// Turn after which `every` keeps a snapshot, for each metre of its distance, rad.
+const TURN_RAD_M: f64 = 0.7;
 /// Farthest between two snapshots for all rules that go by what is seen, m.
 pub const MOST_M: f64 = 4.0;
 
@@ -63,7 +65,7 @@ impl SnapshotRule {
     /// For a rule without one.
     pub fn with(self, number: f64) -> crate::Result<Self> {
         Ok(match self {
-            Self::Every { turn_rad, .. } => Self::Every { distance_m: number, turn_rad },
+            Self::Every { .. } => Self::Every { distance_m: number, turn_rad: TURN_RAD_M * number },
             Self::Drift { .. } => Self::Drift { share: number },
             Self::Shared { .. } => Self::Shared { share: number },
             Self::Locale { .. } => Self::Locale { change_rad: number },

@@ -25,6 +25,8 @@ pub struct Teaching {
     pub rule: SnapshotRule,
     /// Most features of a snapshot.
     pub features: usize,
+    /// Nodes of the path by odometry lie so far apart, m.
+    pub node_m: f64,
     /// Light and camera.
     pub look: Look,
     /// Seed of slip, encoders and camera noise.
@@ -33,7 +35,13 @@ pub struct Teaching {
 
 impl Default for Teaching {
     fn default() -> Self {
-        Self { rule: SnapshotRule::Every { distance_m: 0.5, turn_rad: 0.35 }, features: 120, look: Look::default(), seed: 0 }
+        Self {
+            rule: SnapshotRule::Every { distance_m: 0.5, turn_rad: 0.35 },
+            features: 120,
+            node_m: 0.1,
+            look: Look::default(),
+            seed: 0,
+        }
     }
 }
 
@@ -131,7 +139,7 @@ pub fn teach(
         let briefing = simulation.briefing();
         (briefing.robot, briefing.task)
     };
-    let mut learner = Learner::new(teaching.rule, teaching.features);
+    let mut learner = Learner::new(teaching.rule, teaching.features, teaching.node_m);
     let mut truth: Vec<Pose> = Vec::new();
     let (mut along, mut next, mut collisions) = (0.0, 0, 0);
     learner.step(&simulation.observation()?);
